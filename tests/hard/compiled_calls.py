@@ -776,8 +776,8 @@ ENTRIES: dict[str, Entry] = {
         {"mu": 0.1, "matched": 1e-9},
         **_BARRIER,
     ),
-    "barrier.centre": Entry(
-        barrier.centre,
+    "barrier.center": Entry(
+        barrier.center,
         {**_SLACKS, **_inputs("y"), **_NEWTON, **{name: _updated("R") for name in _TARGETS}},
         {"primal": 0.9, "dual": 0.8, "mu": 0.1, "matched": 1e-9},
         **_BARRIER,
@@ -801,8 +801,8 @@ ENTRIES: dict[str, Entry] = {
             _keeps_a_share(arguments, sizes) and arguments["mu"] >= 0 and arguments["ratio"] >= 1
         ),
     ),
-    "barrier.recentre": Entry(
-        barrier.recentre,
+    "barrier.recenter": Entry(
+        barrier.recenter,
         {**_SLACKS, **_outputs("new_s", "new_zl", "new_zu")},
         {"c": 2.0, "mu": 0.1},
         **_BARRIER,

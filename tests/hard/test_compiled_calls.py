@@ -190,8 +190,8 @@ def test_a_range_of_multipliers_that_is_empty_is_refused(wrong: dict[str, float]
 @pytest.mark.parametrize(
     ("name", "wrong"),
     [
-        ("barrier.recentre", {"c": 0.0}),
-        ("barrier.recentre", {"mu": np.nan}),
+        ("barrier.recenter", {"c": 0.0}),
+        ("barrier.recenter", {"mu": np.nan}),
         ("barrier.follow", {"next_mu": 0.0}),
         ("barrier.follow", {"least": -1.0}),
     ],

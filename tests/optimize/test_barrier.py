@@ -216,11 +216,11 @@ def test_corrected_targets_make_up_for_second_order_terms(seed: int) -> None:
 
 
 @pytest.mark.parametrize("seed", SEEDS)
-def test_centred_targets_bring_outliers_into_a_range(seed: int) -> None:
+def test_centered_targets_bring_outliers_into_a_range(seed: int) -> None:
     """At shares 1.08 a + 0.18: below mu/10 up to it, above 10 mu by at most 10 mu down to it."""
     barrier, y, d = random_direction(seed)
     given, mu = random_targets(seed), 0.02
-    found = barrier.centred_targets(y, d, mu, given)
+    found = barrier.centered_targets(y, d, mu, given)
     primal, dual = (min(1.0, 1.08 * share + 0.18) for share in (d.primal, d.dual))
     below, above = finite_gaps(barrier)
     matched = y == barrier.s
@@ -241,7 +241,7 @@ def test_given_targets_are_not_written_to() -> None:
     barrier, y, d = random_direction(0)
     given = random_targets(0)
     copies = [each.copy() for each in given]
-    barrier.centred_targets(y, d, 0.02, given)
+    barrier.centered_targets(y, d, 0.02, given)
     for each, copy in zip(given, copies, strict=True):
         np.testing.assert_array_equal(each, copy)
 
@@ -497,17 +497,17 @@ def check_central(moved: Barrier, mu: float, wanted: Pair, c: Array) -> None:
 
 
 @pytest.mark.parametrize("seed", SEEDS)
-def test_a_recentred_barrier_is_central_and_keeps_what_holds_bounds(seed: int) -> None:
+def test_a_recentered_barrier_is_central_and_keeps_what_holds_bounds(seed: int) -> None:
     barrier, _ = random_barrier(seed)
     c = np.full_like(barrier.s, 0.7)
-    moved = barrier.recentred(0.7, 1e-3)
+    moved = barrier.recentered(0.7, 1e-3)
     check_central(moved, 1e-3, differences(barrier, barrier.s, barrier.zl, barrier.zu, c), c)
 
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_followed_barrier_is_central_with_the_multipliers_of_the_step(seed: int) -> None:
     start, y = random_barrier(seed)
-    barrier, random = start.recentred(0.7, MU), np.random.default_rng([seed, 3])
+    barrier, random = start.recentered(0.7, MU), np.random.default_rng([seed, 3])
     dy, more = 0.1 * random.normal(size=(2, len(y)))
     y_new, mu = y + dy + 0.1 * more, 0.1 * MU
     moved, outside, work = barrier.followed(y, dy, y_new, mu, 0.7)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import copy
 import dataclasses
 import inspect
@@ -13,6 +14,7 @@ from typing import Any, Generic, TypeVar
 import pytest
 
 from hovi.system.dataclass import dataclass
+from oracles.packages import FILES, Module
 
 Decorator = Callable[..., Any]
 Item = TypeVar("Item")
@@ -186,3 +188,14 @@ def test_other_options_are_left_to_the_standard_library() -> None:
     for owner in both(define):
         assert owner(1) < owner(2)
         assert not hasattr(owner(1), "__dict__")
+
+
+@pytest.mark.parametrize("module", FILES, ids=".".join)
+def test_every_module_of_hovi_takes_this_decorator(module: Module) -> None:
+    if module == ("system", "dataclass"):
+        return
+    for node in ast.walk(ast.parse(FILES[module].read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom) and node.module == "dataclasses":
+            assert "dataclass" not in {each.name for each in node.names}
+        if isinstance(node, ast.Attribute) and ast.unparse(node.value) == "dataclasses":
+            assert node.attr != "dataclass"

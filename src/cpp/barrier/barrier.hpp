@@ -127,7 +127,7 @@ inline double outside(double product, double mu) {
 }
 
 // Targets that bring those products nearer to mu that longer shares of a direction would spoil.
-inline void centre(const Slacks& at, const double* y, const Direction& d, double primal,
+inline void center(const Slacks& at, const double* y, const Direction& d, double primal,
                    double dual, double mu, double matched, double* lower, double* upper) {
   for (std::size_t i = 0; i < at.count; ++i) {
     if (std::abs(y[i] - at.s[i]) > matched) continue;
@@ -190,11 +190,11 @@ inline void move(const Slacks& at, const double* y, const Direction& d, double p
       if (off <= rounding * std::min(low, high) || -mu * std::log(ratios) < penalty * off) s = y[i];
     }
     out.s[i] = s;
-    const double centre_low = mu / std::max(s - at.lower[i], least_gap);
-    const double centre_high = mu / std::max(at.upper[i] - s, least_gap);
+    const double center_low = mu / std::max(s - at.lower[i], least_gap);
+    const double center_high = mu / std::max(at.upper[i] - s, least_gap);
     const double zl = at.zl[i] + dual * d.zl[i], zu = at.zu[i] + dual * d.zu[i];
-    out.zl[i] = at.has_lower(i) ? std::clamp(zl, centre_low / ratio, centre_low * ratio) : 0.0;
-    out.zu[i] = at.has_upper(i) ? std::clamp(zu, centre_high / ratio, centre_high * ratio) : 0.0;
+    out.zl[i] = at.has_lower(i) ? std::clamp(zl, center_low / ratio, center_low * ratio) : 0.0;
+    out.zu[i] = at.has_upper(i) ? std::clamp(zu, center_high / ratio, center_high * ratio) : 0.0;
   }
 }
 
@@ -223,7 +223,7 @@ inline void set_central(const Slacks& at, std::size_t i, double s, double mu,
 }
 
 // The point of the central path with mu that belongs to slacks and multipliers of another one.
-inline void recentre(const Slacks& at, double c, double mu, const Direction& out) {
+inline void recenter(const Slacks& at, double c, double mu, const Direction& out) {
   for (std::size_t i = 0; i < at.count; ++i) {
     const double low = at.zl[i] - c * (at.s[i] - at.lower[i]);
     const double high = at.zu[i] - c * (at.upper[i] - at.s[i]);
@@ -231,16 +231,17 @@ inline void recentre(const Slacks& at, double c, double mu, const Direction& out
   }
 }
 
-// How far outputs are outside their bounds at most, and sum w |zu - zl| |y - s| plus what bounds that
-// no longer hold the solution may give: the negative multipliers, times w and a distance.
+// How far outputs are outside their bounds at most, and sum w |zu - zl| |y - s| plus what bounds
+// that no longer hold the solution may give: the negative multipliers, times w and a distance.
 struct Misses {
   double outside = -infinity, work = 0.0;
 };
 
 // After a Newton step dy of the outputs y, to y_new, from a point of the central path with mu: the
 // point with the next mu. Multipliers are those that the step predicts, gaps those of y_new, and
-// what both say of a bound is weighed with c, between the ratio of multiplier and gap before and the
-// least one. With that ratio bounds would be released slowly, with the least one found slowly.
+// what both say of a bound is weighed with c, the geometric mean of the ratio of multiplier and gap
+// before and of the least one. With the ratio alone bounds would be released slowly, with the least
+// one found slowly.
 inline Misses follow(const Slacks& at, const double* weights, const double* y, const double* dy,
                      const double* y_new, double mu, double next_mu, double least,
                      const Direction& out) {

@@ -103,13 +103,13 @@ void correct(const Vector& lower, const Vector& upper, const Vector& s, const Ve
                          vector("upper_targets", R, upper_targets));
 }
 
-void centre(const Vector& lower, const Vector& upper, const Vector& s, const Vector& zl,
+void center(const Vector& lower, const Vector& upper, const Vector& s, const Vector& zl,
             const Vector& zu, const Vector& y, const Out& ds, const Out& dzl, const Out& dzu,
             double primal, double dual, double mu, double matched, const Out& lower_targets,
             const Out& upper_targets) {
   const Slacks at = slacks_of(lower, upper, s, zl, zu);
   const std::size_t R = at.count;
-  hovi::barrier::centre(at, vector("y", R, y), direction_of(R, ds, dzl, dzu), primal, dual, mu,
+  hovi::barrier::center(at, vector("y", R, y), direction_of(R, ds, dzl, dzu), primal, dual, mu,
                         matched, vector("lower_targets", R, lower_targets),
                         vector("upper_targets", R, upper_targets));
 }
@@ -142,7 +142,7 @@ void require_central(double c, double mu) {
   if (!(c > 0.0 && mu > 0.0)) refuse("c and mu must be positive.");
 }
 
-void recentre(const Vector& lower, const Vector& upper, const Vector& s, const Vector& zl,
+void recenter(const Vector& lower, const Vector& upper, const Vector& s, const Vector& zl,
               const Vector& zu, double c, double mu, const Out& new_s, const Out& new_zl,
               const Out& new_zu) {
   require_central(c, mu);
@@ -150,7 +150,7 @@ void recentre(const Vector& lower, const Vector& upper, const Vector& s, const V
   const std::size_t R = at.count;
   const Direction out{vector("new_s", R, new_s), vector("new_zl", R, new_zl),
                       vector("new_zu", R, new_zu)};
-  hovi::barrier::recentre(at, c, mu, out);
+  hovi::barrier::recenter(at, c, mu, out);
 }
 
 std::tuple<double, double> follow(const Vector& lower, const Vector& upper, const Vector& s,
@@ -183,14 +183,14 @@ NB_MODULE(barrier, m) {
   m.def("largest_miss", &largest_miss, "lower"_a, "upper"_a, "s"_a, "zl"_a, "zu"_a, "mu"_a);
   m.def("correct", &correct, "lower"_a, "upper"_a, "s"_a, "zl"_a, "zu"_a, "y"_a, "ds"_a, "dzl"_a,
         "dzu"_a, "mu"_a, "matched"_a, "lower_targets"_a, "upper_targets"_a);
-  m.def("centre", &centre, "lower"_a, "upper"_a, "s"_a, "zl"_a, "zu"_a, "y"_a, "ds"_a, "dzl"_a,
+  m.def("center", &center, "lower"_a, "upper"_a, "s"_a, "zl"_a, "zu"_a, "y"_a, "ds"_a, "dzl"_a,
         "dzu"_a, "primal"_a, "dual"_a, "mu"_a, "matched"_a, "lower_targets"_a, "upper_targets"_a);
   m.def("merit", &merit, "lower"_a, "upper"_a, "s"_a, "zl"_a, "zu"_a, "weights"_a, "y"_a, "dy"_a,
         "ds"_a, "share"_a, "keep"_a, "mu"_a, "penalty"_a);
   m.def("move", &move, "lower"_a, "upper"_a, "s"_a, "zl"_a, "zu"_a, "y"_a, "ds"_a, "dzl"_a,
         "dzu"_a, "primal"_a, "dual"_a, "keep"_a, "mu"_a, "penalty"_a, "ratio"_a, "new_s"_a,
         "new_zl"_a, "new_zu"_a);
-  m.def("recentre", &recentre, "lower"_a, "upper"_a, "s"_a, "zl"_a, "zu"_a, "c"_a, "mu"_a,
+  m.def("recenter", &recenter, "lower"_a, "upper"_a, "s"_a, "zl"_a, "zu"_a, "c"_a, "mu"_a,
         "new_s"_a, "new_zl"_a, "new_zu"_a);
   m.def("follow", &follow, "lower"_a, "upper"_a, "s"_a, "zl"_a, "zu"_a, "weights"_a, "y"_a, "dy"_a,
         "y_new"_a, "mu"_a, "next_mu"_a, "least"_a, "new_s"_a, "new_zl"_a, "new_zu"_a);

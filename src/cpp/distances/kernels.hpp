@@ -72,8 +72,8 @@ enum class Known : std::int64_t { exactly, far, not_at_all };
 
 // points: configurations, (P, nq). pairs: numbers of k pairs. force: weights of the second
 // derivatives, (P, k), or null. wanted: which distances are, (P, k), or null for all; others count
-// as far. rounding: eps of rounding.hpp, (P, k), in [m], 0 for shapes as they are, or null for all of
-// them.
+// as far. rounding: eps of rounding.hpp, (P, k), in [m], 0 for shapes as they are, or null if all
+// are.
 struct Request {
   std::size_t points;
   const double* q;

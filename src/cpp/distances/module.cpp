@@ -223,5 +223,6 @@ NB_MODULE(distances, m) {
       .def("values", &values, "q"_a, "chosen"_a, "reach"_a, "distances"_a, "known"_a,
            "wanted"_a = nb::none(), "rounding"_a = nb::none())
       .def("expand", &expand, "q"_a, "chosen"_a, "reach"_a, "force"_a.none(), "distances"_a,
-           "known"_a, "jacobian"_a, "curvature"_a, "wanted"_a = nb::none(), "rounding"_a = nb::none());
+           "known"_a, "jacobian"_a, "curvature"_a, "wanted"_a = nb::none(),
+           "rounding"_a = nb::none());
 }

@@ -30,8 +30,8 @@ constexpr double rounding_step = 1e-10;
 constexpr double first_turn = 0.02, most_turn = 0.3;
 constexpr int turn_changes = 12;
 constexpr std::size_t most_candidates = 512;
-// Shapes of many vertices are rounded less, since more of them are near to each other: by these
-// sizes in [m], over the number of vertices, and at least.
+// Shapes of many vertices are rounded less, since more vertices are near to each other: by at most
+// the first of these over their number, but by the second at least, in [m].
 constexpr double rounding_of_all = 0.064, least_rounding = 2e-5;
 
 // The value of a support function, its gradient in the shape's frame, and its Hessian in the plane
@@ -271,7 +271,7 @@ inline Rounded round_within(const Model& model, const Placed& placed, double eps
   return Rounded::found;
 }
 
-// By how much a shape is rounded where it is by `size` at most.
+// The size by which a shape is rounded if `size` is allowed, in [m].
 inline double rounding_of(const Shape& shape, double size) {
   if (shape.kind == ShapeKind::cylinder) return size;
   const double share = rounding_of_all / double(shape.count);

@@ -72,7 +72,7 @@ def correct(
     lower_targets: Array,
     upper_targets: Array,
 ) -> None: ...
-def centre(
+def center(
     lower: Array,
     upper: Array,
     s: Array,
@@ -124,7 +124,7 @@ def move(
     new_zl: Array,
     new_zu: Array,
 ) -> None: ...
-def recentre(
+def recenter(
     lower: Array,
     upper: Array,
     s: Array,

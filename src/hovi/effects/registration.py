@@ -66,6 +66,7 @@ class Registry(MutableMapping[str, type[Effect]]):
 
 
 REGISTRY = Registry()
+"""The effects of hovi.effects, in the order of EFFECTS, then those registered by users."""
 
 
 def register(effect: Kind) -> Kind:

@@ -250,12 +250,12 @@ class Barrier:
         native.correct(*self.arrays, y, *d, mu, SLACK_MATCHED, lower, upper)
         return lower, upper
 
-    def centred_targets(self, y: Array, of: Direction, mu: float, targets: Pair) -> Pair:
+    def centered_targets(self, y: Array, of: Direction, mu: float, targets: Pair) -> Pair:
         """Targets that bring outliers among the products nearer to mu, for longer shares."""
         lower, upper = targets[0].copy(), targets[1].copy()
         primal, dual = (min(1.0, 1.08 * share + 0.18) for share in (of.primal, of.dual))
         d = (of.ds, of.dzl, of.dzu)
-        native.centre(*self.arrays, y, *d, primal, dual, mu, SLACK_MATCHED, lower, upper)
+        native.center(*self.arrays, y, *d, primal, dual, mu, SLACK_MATCHED, lower, upper)
         return lower, upper
 
     def merit(self, y: Array, penalty: float, along: Direction, share: float) -> float:
@@ -278,13 +278,13 @@ class Barrier:
         native.move(*self.arrays, y, *d, *numbers, s, zl, zu)
         return dataclasses.replace(self, s=s, zl=zl, zu=zu)
 
-    def recentred(self, weight: float, mu: float) -> Barrier:
+    def recentered(self, weight: float, mu: float) -> Barrier:
         """The point of the central path with another mu that belongs to this one.
 
         Each bound keeps z - weight gap, so that what holds a bound still does.
         """
         s, zl, zu = (np.empty_like(self.s) for _ in range(3))
-        native.recentre(*self.arrays, weight, mu, s, zl, zu)
+        native.recenter(*self.arrays, weight, mu, s, zl, zu)
         return dataclasses.replace(self, s=s, zl=zl, zu=zu, mu=mu)
 
     def followed(

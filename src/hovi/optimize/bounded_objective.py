@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import field
 from typing import Generic, NamedTuple, TypeVar
 
@@ -13,6 +15,8 @@ from hovi.optimize.barrier import Barrier, Bounds
 from hovi.optimize.quadratic_model import QuadraticModel
 from hovi.optimize.trust_region import Iteration, Stop
 from hovi.system.dataclass import dataclass
+from hovi.system.deadline import Deadline, OutOfTimeError
+from hovi.system.interruption import record_interrupt
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]
@@ -130,6 +134,24 @@ class BoundedOutcome(Generic[X]):
     corrected: bool = False
     marks: list[tuple[float, X]] = field(default_factory=list)
     kept: tuple[X, Outputs] | None = None
+
+    @contextmanager
+    def recorded_end(self, time_limit: float | None) -> Iterator[None]:
+        """An iteration whose end by its time limit, by Ctrl-C or by arithmetic becomes `stop`.
+
+        time_limit: in [s]; None for none.
+        """
+        try:
+            with Deadline(time_limit).in_force():
+                yield
+        except OutOfTimeError:
+            self.stop = Stop.TIME_LIMIT
+            self.x, self.outputs = self.kept or (self.x, self.outputs)
+        except KeyboardInterrupt:
+            record_interrupt()
+            self.stop = Stop.INTERRUPTED
+        except ArithmeticError:
+            self.stop = Stop.DIVERGED
 
     def keep_best(self, bounds: Bounds) -> None:
         """Keep the current point if it is within the bounds, and better than the one kept."""

@@ -111,7 +111,7 @@ class BoundedSteps(Generic[X]):
         for _ in range(CORRECTIONS):
             if min(along.primal, along.dual) > LONG_STEP:
                 break
-            further = barrier.centred_targets(y, along, mu, targets)
+            further = barrier.centered_targets(y, along, mu, targets)
             other, other_s, other_pulled = self._direction(trial, further, model)
             if other.primal + other.dual < along.primal + along.dual + 1e-3:
                 break

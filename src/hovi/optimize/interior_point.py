@@ -39,8 +39,8 @@ from hovi.optimize.bounded_objective import (
 from hovi.optimize.bounded_steps import BoundedStep, BoundedSteps
 from hovi.optimize.quadratic_model import QuadraticModel, decrease_ratio, next_radius, next_shift
 from hovi.optimize.trust_region import Iteration, Options, Stop
-from hovi.system.deadline import Deadline, OutOfTimeError, raise_if_late
-from hovi.system.interruption import raise_if_interrupted, record_interrupt
+from hovi.system.deadline import raise_if_late
+from hovi.system.interruption import raise_if_interrupted
 
 Array = npt.NDArray[np.float64]
 X = TypeVar("X")
@@ -69,7 +69,7 @@ MAX_REFINEMENTS = 40
 """Maximum number of refinements."""
 ALIKE, MOST_GROWTH = 0.05, 4.0
 """Relative difference of the actual and the predicted decrease up to which the radius grows by the
-second of these."""
+second of these, if the objective reopens; others begin with a radius that is wide enough."""
 SHORT_SHARE = 0.1
 """Share of a step at the radius below which it was too long for the bounds that cut it."""
 MATCHED = 1e-4
@@ -127,17 +127,8 @@ def minimize_bounded(
         outcome.stop = Stop.DIVERGED
         return outcome
     outcome.keep_best(objective.bounds)
-    try:
-        with Deadline(options.time_limit).in_force():
-            _Iteration(objective, outcome, options, density, report, plain).run()
-    except OutOfTimeError:
-        outcome.stop = Stop.TIME_LIMIT
-        outcome.x, outcome.outputs = outcome.kept or (outcome.x, outcome.outputs)
-    except KeyboardInterrupt:
-        record_interrupt()
-        outcome.stop = Stop.INTERRUPTED
-    except ArithmeticError:
-        outcome.stop = Stop.DIVERGED
+    with outcome.recorded_end(options.time_limit):
+        _Iteration(objective, outcome, options, density, report, plain).run()
     return outcome
 
 
@@ -243,16 +234,16 @@ class _Iteration(BoundedSteps[X]):
         """The radius after a step, which the bounds may have cut."""
         norm, last = step.trial.norm, self.radius
         length = norm * step.share
-        radius, among = next_radius(last, length, ratio), self.objective.reopens
-        if among and abs(ratio - 1.0) <= ALIKE and length > 0.7 * last:
+        radius, reopens = next_radius(last, length, ratio), self.objective.reopens
+        if reopens and abs(ratio - 1.0) <= ALIKE and length > 0.7 * last:
             return max(radius, MOST_GROWTH * last)
         if step.trial.newton or step.share >= SHORT_SHARE:
             return radius
         if self.outcome.violation.max(initial=0.0) <= MATCHED:
             return min(radius, max(CUT_RADIUS * length, LEAST_CUT_RADIUS))
-        if not among:
+        if not reopens:
             return radius
-        # towards bounds that are not met yet a radius as short as the step would lead nowhere
+        # a radius as short as the step would lead nowhere while bounds are not met
         return min(last, norm) * (SHORTENED if ratio > 1e-4 else SHORTENED**2)
 
     def _hold(self, reaction: Array | None, sign: float) -> float:

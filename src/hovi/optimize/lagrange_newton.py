@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
@@ -22,6 +22,7 @@ from hovi.optimize.constrained_model import ConstrainedModel, EqualityObjective,
 from hovi.optimize.quadratic_model import Factor
 from hovi.optimize.restoration import restore
 from hovi.optimize.trust_region import Iteration, Options, Outcome, Stop
+from hovi.system.dataclass import dataclass
 from hovi.system.deadline import Deadline, OutOfTimeError, raise_if_late
 from hovi.system.interruption import raise_if_interrupted, record_interrupt
 
@@ -77,7 +78,7 @@ class ConstrainedIteration(Iteration):
     residual: float
 
 
-@dataclass
+@dataclass()
 class ConstrainedOutcome(Outcome[X]):
     """The final point with its multipliers.
 

@@ -27,8 +27,8 @@ from hovi.optimize.barrier import Barrier
 from hovi.optimize.bounded_objective import BoundedObjective, BoundedOutcome
 from hovi.optimize.quadratic_model import QuadraticModel
 from hovi.optimize.trust_region import Iteration, Options, Stop
-from hovi.system.deadline import Deadline, OutOfTimeError, raise_if_late
-from hovi.system.interruption import raise_if_interrupted, record_interrupt
+from hovi.system.deadline import raise_if_late
+from hovi.system.interruption import raise_if_interrupted
 
 Array = npt.NDArray[np.float64]
 X = TypeVar("X")
@@ -64,17 +64,8 @@ def follow_bounded(
     outcome = BoundedOutcome(x, objective.outputs(x), known, Stop.DIVERGED)
     if not np.isfinite(outcome.outputs.value):
         return outcome
-    try:
-        with Deadline(options.time_limit).in_force():
-            _Newton(objective, outcome, options, report).run()
-    except OutOfTimeError:
-        outcome.stop = Stop.TIME_LIMIT
-        outcome.x, outcome.outputs = outcome.kept or (outcome.x, outcome.outputs)
-    except KeyboardInterrupt:
-        record_interrupt()
-        outcome.stop = Stop.INTERRUPTED
-    except ArithmeticError:
-        outcome.stop = Stop.DIVERGED
+    with outcome.recorded_end(options.time_limit):
+        _Newton(objective, outcome, options, report).run()
     return outcome
 
 
@@ -98,7 +89,7 @@ class _Newton(Generic[X]):
         outside = float(known.outside(outputs.y).max(initial=0.0))
         self.farthest = LARGEST_GROWTH * max(outside, LEAST_OUTSIDE)
         mu = min(FIRST_MU * outside**2, LARGEST_FIRST_MU) * self.density
-        outcome.barrier = known.recentred(self.weight, max(self.last_mu, mu))
+        outcome.barrier = known.recentered(self.weight, max(self.last_mu, mu))
         self.outside, self.work = 0.0, math.inf
         outcome.keep_best(objective.bounds)
 
@@ -165,5 +156,5 @@ class _Newton(Generic[X]):
         y = outcome.outputs.y
         bounds = objective.bounds.shrunk(ROOM)
         refined = outcome.barrier.refined(bounds, y, found.kept, found.origin, before)
-        outcome.barrier = refined.recentred(self.weight, refined.mu)
+        outcome.barrier = refined.recentered(self.weight, refined.mu)
         return True

@@ -7,13 +7,14 @@ stationary point that is not zero. [NocedalWright2006, section 10.3]
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Generic, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
 from hovi.optimize.constrained_model import ConstrainedModel, EqualityObjective, size_of
+from hovi.system.dataclass import dataclass
 from hovi.system.deadline import raise_if_late
 from hovi.system.interruption import raise_if_interrupted
 

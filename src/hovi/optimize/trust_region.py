@@ -11,7 +11,7 @@ import math
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from enum import StrEnum
 from typing import Generic, NamedTuple, TypeVar
 
@@ -25,6 +25,7 @@ from hovi.optimize.quadratic_model import (
     next_radius,
     next_shift,
 )
+from hovi.system.dataclass import dataclass
 from hovi.system.deadline import Deadline, OutOfTimeError, raise_if_late
 from hovi.system.interruption import raise_if_interrupted, record_interrupt
 
@@ -88,15 +89,14 @@ class Options:
         remains after it is of the order of its square.
     step: stop when a Newton step is smaller than this, relative to the data.
     max_iterations: number of steps, rejected ones included. time_limit: in [s], or None.
-    radius: initial radius of the trust region, in the norm of the metric; objectives with bounds
-        have their own: see BoundedObjective.radii.
+    radius: first radius of the trust region, in the metric; with bounds: BoundedObjective.radii.
     escape_saddles: leave a saddle along negative curvature; False stops there.
     exact: stop only after a Newton step of an exact model, after which only rounding remains.
     near: whether the first iterate is near a solution, so that a barrier begins small.
     barrier: its last parameter, relative to the mean density of the objective.
-    enough: with a barrier, stop within the bounds where a whole Newton step predicts a smaller
-        decrease, relative to the value, even if it would be cut short.
-    stalled: without one, stop where STALLED_STEPS steps decrease the value by a smaller share.
+    enough: with bounds, stop within them where a whole Newton step predicts a smaller decrease,
+        relative to the value, even if it would be cut short.
+    stalled: without bounds, stop where STALLED_STEPS steps decrease the value by a smaller share.
     """
 
     decrease: float = 1e-11
@@ -127,7 +127,7 @@ class Iteration:
     radius: float
 
 
-@dataclass
+@dataclass()
 class Outcome(Generic[X]):
     """The final point and why the iteration ended.
 

@@ -1,1 +1,1 @@
-"""Operating system services: files, interrupts, deadlines, threads."""
+"""Services that know no robot: files, interrupts, deadlines, threads, dataclasses."""

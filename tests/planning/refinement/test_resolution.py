@@ -164,7 +164,7 @@ def test_replanning_near_a_resolved_motion_keeps_its_estimate(arm_scene: Scene) 
 def test_within_limits_a_motion_is_compared_with_the_followed_finer_one(
     two_link: Robot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Its estimate is that of a comparison from anew, at less cost."""
+    """Its estimate is that of a new comparison, at less cost."""
     scene = Scene(two_link, [hovi.effects.Gravity()])
     ld = DiscreteLagrangian(scene.effort_lagrangian(), Grid.uniform(1.0, 24, by_name("galerkin-2")))
     limits = as_limits(two_link, {"base": "none", "v": 1.6, "tau": 60.0})

@@ -12,9 +12,6 @@ from hovi.system.dataclass import dataclass
 from hovi.viewing.curves.unwrapped_angles import shown_names, unwrapped
 
 if TYPE_CHECKING:
-    pass
-
-if TYPE_CHECKING:
     from hovi.flows.simulator import Simulation
 
 

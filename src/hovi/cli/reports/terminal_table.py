@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from itertools import zip_longest
 
 NARROWEST = 8
-"""Characters to which a column of text is folded at most."""
+"""Least width of a column of text that is folded, in characters."""
 GAP = "  "
 
 

@@ -27,7 +27,7 @@ GRASPED_KEYS = {
     "mass": "a positive number of kilograms",
     "shape": "a table such as an obstacle's, or a list of them",
 }
-"""What a table of a grasped obstacle must have, and what that is."""
+"""What a table of a grasped object must have, and what that is."""
 
 
 class Body(NamedTuple):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import partial
 
 import numpy as np
@@ -29,6 +29,7 @@ from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.solver import Solution, solve_on_grid
 from hovi.planning.solver.status import Status
 from hovi.schemes import galerkin
+from hovi.system.dataclass import dataclass
 from hovi.system.deadline import Deadline, OutOfTimeError
 from hovi.system.interruption import (
     interrupted,

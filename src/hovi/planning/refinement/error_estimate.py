@@ -156,8 +156,8 @@ def richer_within_limits(
 def followed_within_limits(solution: Solution, known: FinerSolution) -> FinerSolution | None:
     """The finer solution within limits, followed from that of a motion between other ends.
 
-    Without gains, and with nothing more to finish. known: that one. None where it does not belong
-    to the solution's grid, or is too far away.
+    Without gains, and with nothing more to finish. known: that of the other motion. None where it
+    does not belong to the solution's grid, or is too far away.
     """
     problem, path = solution.problem, solution.trajectory.path
     assert problem is not None
@@ -166,7 +166,7 @@ def followed_within_limits(solution: Solution, known: FinerSolution) -> FinerSol
     if not np.array_equal(known.problem.grid.steps, problem.grid.steps):
         return None
     fine = known.problem.between(problem.start, problem.goal)
-    from hovi.planning.solver.methods.feasibility import follow  # as above
+    from hovi.planning.solver.methods.feasibility import follow  # 10 ms
 
     central = follow(fine, known.central, RICHER_BARRIER)
     if central is None:

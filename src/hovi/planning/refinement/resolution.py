@@ -181,7 +181,7 @@ class Resolution(MotionCheck):
         return dataclasses.replace(with_estimate(solution, self.estimate), check=self)
 
     def _followed(self, solution: Solution) -> Solution | None:
-        """As `resolved`, compared with the followed finer solution; None where that says no."""
+        """As `resolved`, compared with the followed finer solution; None where that fails."""
         if self.finer is None or not solution.success:
             return None
         try:

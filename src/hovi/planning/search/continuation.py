@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import HoviError
@@ -19,6 +19,7 @@ from hovi.planning.search.homotopies import (
 from hovi.planning.search.job import Job
 from hovi.planning.solver.solver import Solution, solve_on_grid
 from hovi.planning.solver.status import Status
+from hovi.system.dataclass import dataclass
 from hovi.system.deadline import Deadline
 from hovi.system.interruption import record_interrupt
 from hovi.system.progress import Progress

@@ -19,7 +19,7 @@ from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
 
 Array = npt.NDArray[np.float64]
-T = TypeVar("T")
+Goal = TypeVar("Goal")
 
 
 def in_group(
@@ -55,8 +55,8 @@ def in_group(
 
 
 def with_others(
-    goal: T, group: str | None, robot: Robot, start: State | FrameGoal | None
-) -> T | State | Mapping[str, Any]:
+    goal: Goal, group: str | None, robot: Robot, start: State | FrameGoal | None
+) -> Goal | State | Mapping[str, Any]:
     """The goal, with the joints outside of the group that its table of joints leaves out.
 
     They are where they are at the start. Raises InputError for an unknown group.

@@ -36,10 +36,11 @@ from hovi.planning.solver.outcome.without_solve import infeasible_at_once
 from hovi.planning.solver.solver import Solution
 from hovi.planning.solver.status import Status
 from hovi.robot.robot import Robot
-from hovi.robot.space.angle_ranges import LOOKS
+from hovi.robot.space.angle_ranges import LOOKS_LIKE_DEGREES
 from hovi.scene.scene import Scene
 from hovi.schemes import is_galerkin, of_order
 from hovi.system.blas_threads import one_blas_thread
+from hovi.system.dataclass import dataclass
 from hovi.system.deadline import Deadline
 from hovi.system.interruption import interruptible
 from hovi.system.progress import Progress, shows_progress, silent
@@ -204,7 +205,7 @@ def holding(scene: Scene, options: PlanOptions) -> Scene:
     return scene_holding(scene, tuple(options.grasped))
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class _Planning:
     """What jobs are made of: see `plan`. duration: of the first solve, in [s]."""
 
@@ -299,17 +300,17 @@ def _goal(goal: End, robot: Robot, options: PlanOptions) -> State | FrameGoal:
 
 
 def warn_of_ends(
-    robot: Robot, start: State, goal: State | FrameGoal, options: PlanOptions, told: str = ""
+    robot: Robot, start: State, goal: State | FrameGoal, options: PlanOptions, reason: str = ""
 ) -> None:
     """Warn if the given configurations, in order of time, or what is grasped look like degrees or
     millimetres.
 
-    told: why there is no motion, if that is known; degrees that it tells of are not told again.
+    reason: why there is no motion, if that is known. If it mentions degrees, no warning does.
     """
     for sentence in grasped_slips(options.grasped):
         warn(sentence)
     stops = sorted(options.via, key=lambda via: via.time)
     given = [start, *(via.goal for via in stops), goal]
     states = [each for each in given if isinstance(each, State)]
-    if LOOKS not in told:
+    if LOOKS_LIKE_DEGREES not in reason:
         warn_of_degrees(robot, [state.on(robot, "state")[0] for state in states])

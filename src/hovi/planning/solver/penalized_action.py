@@ -7,7 +7,6 @@ violates the limits less. [NocedalWright2006, section 17.2]
 from __future__ import annotations
 
 import dataclasses
-from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -17,6 +16,7 @@ from hovi.optimize.bounded_objective import Outputs
 from hovi.optimize.quadratic_model import QuadraticModel
 from hovi.optimize.trust_region import Objective, Options, Stop, minimize
 from hovi.planning.solver.bounded_action import BoundedAction
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 
@@ -78,10 +78,11 @@ class PenalizedAction(Objective[DiscretePath]):
 
 @dataclass(frozen=True, eq=False)
 class LeastViolation:
-    """A motion near one of least violation.
+    """A motion near one of least violation, and how it was found.
 
-    value: the action. violation: the largest, as a share of its range. squares: sum weights
-    (distance outside)^2. least: whether the violation is near a minimum, which is not zero.
+    path, value: the motion and its action. violation: the largest, as a share of its range.
+    squares: sum weights (distance outside)^2. steps, stop: how many, and why they ended.
+    least: whether the violation is near a minimum, which is not zero.
     """
 
     path: DiscretePath

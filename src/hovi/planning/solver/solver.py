@@ -78,7 +78,7 @@ class Solution(SolutionSummary):
         optimiser. n_neg: negative eigenvalues of the action's Hessian; -1 if they were not counted.
     minima: costs of all minima that a multi-start found, ascending.
     history: one record per step.
-    setup_seconds, solve_seconds: wall time before and during the solve. problem: that was solved.
+    setup_seconds, solve_seconds: wall time before and during the solve. problem: what was solved.
     forces: multipliers of limits and of passive joints' torques at the quadrature points, and of
         limits at instants between them. instants: these; None for none.
     central: the path of a barrier method to this motion; `replan` starts there. check: returns a

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -24,9 +24,14 @@ from hovi.robot.space.joint_table import JointError
 _FREE = ("free", "free_velocity", "free_acceleration")
 
 
-Begin = tuple[str | None, State | FrameGoal | None]
-"""The group that moves, and the start, where the other joints stay."""
-NO_GROUP: Begin = (None, None)
+class Begin(NamedTuple):
+    """The group that moves, and the start, where the other joints stay."""
+
+    group: str | None = None
+    start: State | FrameGoal | None = None
+
+
+NO_GROUP = Begin()
 
 
 def read_end(
@@ -38,7 +43,7 @@ def read_end(
     """
     name = spelled(keys)
     try:
-        table = with_others(_given(end), begin[0], robot, begin[1])
+        table = with_others(_given(end), begin.group, robot, begin.start)
         assert isinstance(table, Mapping)
         chosen = end_of(table, name)
         if isinstance(chosen, FrameGoal):

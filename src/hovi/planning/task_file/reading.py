@@ -17,7 +17,7 @@ from hovi.planning.problem.tolerance import Tolerance
 from hovi.planning.problem.units import as_duration
 from hovi.planning.search.options import INTERVALS_TWICE, TOLERANCE_AND_SCHEME, PlanOptions
 from hovi.planning.task_file.effect_tables import read_effects
-from hovi.planning.task_file.goal_tables import read_end, read_via
+from hovi.planning.task_file.goal_tables import Begin, read_end, read_via
 from hovi.planning.task_file.limit_tables import read_limits
 from hovi.planning.task_file.messages import TomlText, first_sentence
 from hovi.planning.task_file.scene_cache import (
@@ -80,14 +80,15 @@ def task_of(data: Mapping[str, Any], toml: TomlText, cache: SceneCache | None = 
     )
     scene = kept.get("scene", chosen(data, SCENE_KEYS), lambda: _scene(table, robot, toml))
     start = read_end(table.start, ("start",), held, toml)
+    begin = Begin(table.group, start)
     if table.segments:
-        segments = read_segments(table.segments, held, toml, (table.group, start))
+        segments = read_segments(table.segments, held, toml, begin)
         whole = sum(each.duration for each in segments)
         options = _options(table, whole, held, grasped, toml)
         return Task.of_segments(scene, start, segments, options, name)
     assert table.goal is not None
     duration = _duration(table.duration, toml)
-    goal = read_end(table.goal, ("goal",), held, toml, (table.group, start))
+    goal = read_end(table.goal, ("goal",), held, toml, begin)
     without = MOTION_KEYS[:2] if table.via else MOTION_KEYS  # via points are before its end
     options = kept.get(
         "options",

@@ -17,7 +17,7 @@ DEGREE_STEP = 0.5
 """Angles in degrees are mostly whole numbers, or halves."""
 
 
-LOOKS = "looks like degrees"
+LOOKS_LIKE_DEGREES = "looks like degrees"
 """What every clause about an angle says."""
 
 
@@ -91,8 +91,8 @@ def angles_in_degrees(
     count = len(found) - 1
     more = f" ({count} more {'joint' if count == 1 else 'joints'} too)" if count else ""
     return (
-        f"{names[i]} is {largest:g} rad in a given configuration{more}, which {LOOKS}: "
-        f"{largest:g} degrees are {np.radians(largest):.4g} rad"
+        f"{names[i]} is {largest:g} rad in a given configuration{more}, "
+        f"which {LOOKS_LIKE_DEGREES}: {largest:g} degrees are {np.radians(largest):.4g} rad"
     )
 
 
@@ -105,7 +105,7 @@ def beyond_in_degrees(angle: float, lower: float, upper: float) -> str:
         return ""
     if not (abs(angle) <= MAX_SUSPICIOUS and lower <= np.radians(angle) <= upper):
         return ""
-    return f"which {LOOKS}: {angle:g} degrees are {np.radians(angle):.4g} rad"
+    return f"which {LOOKS_LIKE_DEGREES}: {angle:g} degrees are {np.radians(angle):.4g} rad"
 
 
 def rpy_in_degrees(rpy: Array) -> str:
@@ -120,4 +120,4 @@ def rpy_in_degrees(rpy: Array) -> str:
     if not whole.all():
         return ""
     shown, radians = (", ".join(f"{x:.4g}" for x in each) for each in (rpy, np.radians(rpy)))
-    return f"rpy = ({shown}) rad {LOOKS}: these degrees are ({radians}) rad"
+    return f"rpy = ({shown}) rad {LOOKS_LIKE_DEGREES}: these degrees are ({radians}) rad"

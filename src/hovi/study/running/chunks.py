@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 
 import numpy as np
@@ -14,6 +14,7 @@ from hovi.study.cells.template import HASH_DIGITS
 from hovi.study.running.work import CellJob, Guess, Output, Receipt
 from hovi.study.storage.index import Index
 from hovi.study.storage.journal import Stored
+from hovi.system.dataclass import dataclass
 from hovi.workers.source import Source, Taken
 
 CHUNK_SECONDS = 0.5

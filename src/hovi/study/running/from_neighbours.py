@@ -7,7 +7,7 @@ fine, and so on. A cell can be begun when all its parents are done.
 from __future__ import annotations
 
 import heapq
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 
 import numpy as np
@@ -16,6 +16,7 @@ import numpy.typing as npt
 from hovi.study.running.chunks import Chunk, Chunks, job_of
 from hovi.study.running.work import CellJob, Guess
 from hovi.study.storage.journal import Stored
+from hovi.system.dataclass import dataclass
 
 
 @dataclass(eq=False)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import tempfile
 from collections import OrderedDict
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 
 import numpy as np
@@ -24,6 +24,7 @@ from hovi.robot.robot import Robot
 from hovi.scene.lagrangian import Lagrangian
 from hovi.scene.scene import Scene
 from hovi.study.storage.journal import Stored
+from hovi.system.dataclass import dataclass
 
 MAX_MOTIONS = 256
 """Motions that a worker keeps; those that were not used for the longest time are dropped."""

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from hovi.study.running.chunks import Chunk, Chunks, job_of
 from hovi.study.running.work import CellJob
 from hovi.study.storage.journal import Stored
+from hovi.system.dataclass import dataclass
 
 
 @dataclass(eq=False)

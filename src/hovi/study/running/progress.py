@@ -6,9 +6,10 @@ import time
 from collections import Counter, deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from hovi.study.running.work import Receipt
+from hovi.system.dataclass import dataclass
 from hovi.system.progress import reported
 
 RATE_SECONDS = 30.0

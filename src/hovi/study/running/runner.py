@@ -5,7 +5,7 @@ from __future__ import annotations
 import secrets
 from collections.abc import Generator
 from contextlib import closing
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +19,7 @@ from hovi.study.running.work import CellJob, Output, Receipt, StudyWork
 from hovi.study.storage.index import Index
 from hovi.study.storage.journal import JournalWriter, StorageError
 from hovi.study.storage.tables import write_tables
+from hovi.system.dataclass import dataclass
 from hovi.system.deadline import Deadline
 from hovi.workers.lost import Lost
 from hovi.workers.pool import results_from

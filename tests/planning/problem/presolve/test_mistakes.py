@@ -454,7 +454,7 @@ def test_a_task_without_a_motion_is_refused_with_the_reason(mistake: str, comman
     assert message in printed
 
 
-def test_degrees_outside_limits_are_told_once(command: Any) -> None:
+def test_degrees_outside_limits_are_reported_once(command: Any) -> None:
     task, _ = REFUSED["a goal in degrees"]
     _, warnings, message = sentences(task)
     assert "degrees" in message

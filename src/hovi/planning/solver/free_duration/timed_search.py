@@ -7,7 +7,6 @@ or halvings of intervals, a solve moves the motion and the duration.
 from __future__ import annotations
 
 import dataclasses
-from dataclasses import dataclass
 
 from hovi.discrete.grid import DiscretePath
 from hovi.optimize.barrier import Barrier
@@ -24,6 +23,7 @@ from hovi.planning.solver.methods.feasibility import solved_from
 from hovi.planning.solver.methods.limits_between_points import tightened, usable
 from hovi.planning.solver.methods.method import MethodResult
 from hovi.planning.solver.status import Status, unfinished
+from hovi.system.dataclass import dataclass
 from hovi.system.deadline import OutOfTimeError, raise_if_late
 from hovi.system.interruption import record_interrupt
 
@@ -85,7 +85,7 @@ class TimedSearch(BoundedSearch):
         outcome = self._at_its_duration(found, objective)
         self.points = []  # these are of other durations
         if outcome.stop is Stop.STATIONARY and outcome.marks:
-            self._followed(outcome, objective.at(found.x.duration))
+            self._add_points(outcome, objective.at(found.x.duration))
         return outcome
 
     def solve_fixed(self, path: DiscretePath) -> Bounded:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
@@ -47,6 +46,7 @@ from hovi.planning.solver.multipliers import Multipliers
 from hovi.planning.solver.near.clearance_rows import ClearanceRows
 from hovi.planning.solver.near.cleared_action import ClearedAction
 from hovi.scene.lagrangian import PointTerms
+from hovi.system.dataclass import dataclass
 from hovi.system.deadline import Deadline, raise_if_late
 
 Array = npt.NDArray[np.float64]
@@ -194,7 +194,7 @@ class BoundedSearch:
         barrier = outcome.barrier if apart else None
         return CentralPath(points, self.rows, barrier, self.margins, self.near)
 
-    def _followed(self, outcome: Bounded, objective: BoundedAction) -> None:
+    def _add_points(self, outcome: Bounded, objective: BoundedAction) -> None:
         """Add the points at which the barrier of a solve was larger to those of earlier solves.
 
         These are on the central path of a similar problem only, perhaps between other ends, but the
@@ -283,7 +283,7 @@ class BoundedSearch:
         self.history += outcome.history
         self.last, self.solved = (self.problem, outcome.x), (outcome, objective)
         if outcome.stop is Stop.STATIONARY and outcome.marks:
-            self._followed(outcome, objective)
+            self._add_points(outcome, objective)
         return outcome
 
     def forces(self, outcome: Bounded) -> tuple[Instants | None, list[PointTerms]]:

@@ -67,7 +67,7 @@ def cleared_motion(search: BoundedSearch, guess: DiscretePath) -> Bounded:
     """A motion within limits that keeps its distances, from a guess that may keep neither.
 
     It is solved without distances, until it can be seen whether it keeps them. If it does not, a
-    motion with stops is solved leg by leg, and then as a whole. Without stops, or where that fails,
+    motion with seams is solved leg by leg, and then as a whole. Without legs, or where that fails,
     it is moved out of the obstacles, and so is the guess if that takes a detour. The better rough
     motion, by bounds and then by cost, is solved to its end; the other where that diverges.
     """

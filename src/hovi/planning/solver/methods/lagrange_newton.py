@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 import numpy.typing as npt
@@ -30,6 +30,7 @@ from hovi.planning.solver.methods.augmented_lagrangian import (
     with_offset,
 )
 from hovi.planning.solver.methods.method import Method, MethodResult, Report
+from hovi.system.dataclass import dataclass
 from hovi.system.deadline import Deadline, OutOfTimeError
 
 Array = npt.NDArray[np.float64]

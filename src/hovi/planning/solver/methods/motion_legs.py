@@ -1,4 +1,4 @@
-"""Motions from seam to seam: where q and v are given, little joins what is before and after.
+"""Legs, motions from seam to seam: where q and v are given, little joins what is before and after.
 
 For Lagrangians of order 2 the action and all bounds are then a sum over the legs between such
 seams, which are independent of each other; for order 3 the accelerations at the seams join them,
@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -23,6 +22,7 @@ from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.problem.seams import Hold
 from hovi.scene.lagrangian import Lagrangian
 from hovi.scene.segmented_lagrangian import SegmentedLagrangian
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 

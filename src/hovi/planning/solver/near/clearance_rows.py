@@ -58,6 +58,12 @@ class ClearanceRows:
     They are as `ClearanceOutputs` measures them. None at first; `extend` adds some.
 
     problem: with the grid and the ends. distances: of all pairs. least: lower bound, in [m].
+    intervals, positions, pairs, rounding: of each row, shape (E,): its interval, where it is in it,
+        from 0 to 1, the number of its pair, and the size by which its shapes are rounded, in [m].
+    handed: see Refinement; numbers among these rows. order: see `stand_behind`.
+    fixed: whether rows stay as they are. guard: distance beyond the least one below which `follow`
+        adds rows, in [m]. probing, blocked: see `extend`. watchful: whether pairs are followed even
+        before there are any rows.
     """
 
     def __init__(self, problem: TrajectoryProblem, distances: Distances, least: float) -> None:
@@ -161,8 +167,8 @@ class ClearanceRows:
     def sharpen(self, path: DiscretePath) -> bool:
         """Round shapes less in rows that have come nearer to their bounds; whether there are any.
 
-        Their outputs grow by that. Shapes that are rounder than their pair is far bend the motion
-        less, and so steps may be longer; at a bound they are nearly as they are.
+        Their outputs grow by that. Rounder shapes bend the motion less where it is far, so that
+        steps may be longer; at a bound they are nearly as they are.
         """
         size = _rounding_of(self.values(path))
         sharper = size < SHARPENED * self.rounding
