@@ -35,6 +35,7 @@ KINDS = {
     "segments": ("hard.mutated_segments", 6_000),
     "obstacles": ("hard.mutated_obstacles", 10_000),
     "study": ("hard.mutated_study", 6_000),
+    "command": ("hard.mutated_command", 2_000),
     "compiled": ("hard.compiled_calls", 14_000),
     "api": ("hard.api_calls", 14_000),
     "mesh": ("hard.mutated_mesh", 3_000),

@@ -1,6 +1,6 @@
 """Fuzzing guided by coverage: atheris searches for bytes that reach new lines of the readers.
 
-    python fuzz_coverage.py urdf|scene|trajectory|segments|study|mesh|compiled|api SECONDS
+    python fuzz_coverage.py urdf|scene|trajectory|segments|study|command|mesh|compiled|api SECONDS
 
 It starts from mutated inputs of tests/hard, stops at the first fault, and saves it to a file.
 """
@@ -24,6 +24,7 @@ MODULES = {
     "trajectory": "hard.mutated_motion",
     "segments": "hard.mutated_segments",
     "study": "hard.mutated_study",
+    "command": "hard.mutated_command",
     "compiled": "hard.compiled_calls",
     "api": "hard.api_calls",
     "mesh": "hard.mutated_mesh",

@@ -504,6 +504,11 @@ def _with_hand() -> hovi.Scene:
     return hovi.Scene(panda(), [hovi.effects.Gravity()])
 
 
+def _arm_alone() -> dict[str, float]:
+    """A goal that leaves out the fingers, which stay where they start."""
+    return {joint: 0.0 for joint in panda().joint_names if "finger" not in joint}
+
+
 @cache
 def _hand_goal() -> hovi.FrameGoal:
     return hovi.FrameGoal("panda_hand", position=[0.4, 0.1, 0.4], axis=([0, 0, 1], [0, 0, -1]))
@@ -534,6 +539,10 @@ def _plans() -> list[Call]:
         call(hovi.plan, scene(), *ends, (0.5, 1.0), **quick),
         call(hovi.plan, scene(), *ends, 1.0, smooth=True, **quick),
         call(hovi.plan, _with_hand(), np.zeros(9), np.zeros(9), 1.0, group="arm", **quick),
+        *(
+            call(hovi.plan, _with_hand(), np.zeros(9), goal, 1.0, group="arm", **quick)
+            for goal in (_arm_alone(), {"q": _arm_alone()}, hovi.State(_arm_alone()))
+        ),
         call(
             hovi.plan, scene(), hovi.FrameGoal("tip", position=[0.3, 0, -2]), ends[1], 1.0, **quick
         ),
@@ -664,6 +673,11 @@ def _sequences() -> list[Call]:
             *(hovi.plan_sequence, scene(), {"q": [0.0, 0.0]}),
             [{"goal": {"q": [0.3, 0.7]}, "duration": "500 ms"}, {"goal": [0, 0], "duration": 1.0}],
             **quick,
+        ),
+        call(
+            *(hovi.plan_sequence, _with_hand(), np.zeros(9)),
+            [{"goal": _arm_alone(), "duration": 1.0}],
+            **{"group": "arm", "max_iterations": 2, "time_limit": 1.0, **quick},
         ),
         call(hovi.holding, robot(), {"frame": "forearm", "mass": 1.0, "shape": BALL}),
         call(hovi.plan_task, task, progress=None, intervals=2),

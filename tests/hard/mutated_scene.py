@@ -17,6 +17,7 @@ import numpy as np
 import tomlkit
 
 from hard.mutated_bytes import mutated_bytes
+from hard.mutated_robots import grouped, half_a_group, no_robot, placed, shipped
 from hard.verdict import Mutant, Verdict, judge
 from hovi.discrete.state import State
 from hovi.planning.problem.frame_goal import FrameGoal
@@ -83,25 +84,26 @@ def mutate(random: Random) -> Mutant:
     kind = random.random()
     if kind < 0.35:
         return Mutant(mutated_bytes(text.encode(), random, TOKENS))
-    scene = tomllib.loads(text)
     if kind < 0.75:
-        for _ in range(random.randint(1, 3)):
-            random.choice(_CHANGES)(scene, random)
-        return Mutant(_written(scene))
+        return Mutant(changed(text, random))
+    scene = tomllib.loads(text)
     sequence = "segments" in scene
     change = random.choice(_SEGMENT_CHANGES if sequence else _INVALIDATING_CHANGES)
     change(scene, random)
     return Mutant(_written(scene), (change.__doc__ or "").split("\n")[0])
 
 
+def changed(text: str, random: Random, count: int = 3) -> bytes:
+    """A scene with one change or up to `count`, after which it may or may not be valid."""
+    scene = tomllib.loads(text)
+    for _ in range(random.randint(1, count)):
+        random.choice(_CHANGES)(scene, random)
+    return _written(scene)
+
+
 def verdict(mutant: Mutant, folder: Path) -> tuple[Verdict, str]:
     """Load it from a file in `folder`, and plan for two iterations."""
-    for urdf in example("two_link.urdf").parent.glob("*.urdf"):
-        copy = folder / urdf.name
-        if not copy.exists():
-            copy.write_text(urdf.read_text())
-    path = folder / "scene.toml"
-    path.write_bytes(mutant.content)
+    path = placed(mutant.content, folder)
     return judge(lambda: load_task(path), error_in, mutant.reason)
 
 
@@ -242,7 +244,7 @@ def _cost(scene: dict[str, Any], random: Random) -> None:
 
 _CHANGES: tuple[Change, ...] = (
     *(_value, _value, _remove, _rename, _swap, _settings, _passed),
-    *(_cost, _framed, _held, _spelled),
+    *(_cost, _framed, _held, _spelled, grouped, shipped),
 )
 
 # Changes that make the file invalid; the docstring is the reason
@@ -332,4 +334,6 @@ _INVALIDATING_CHANGES: tuple[Change, ...] = (
     _unknown,
     _gravity,
     _lacking,
+    no_robot,
+    half_a_group,
 )

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from hard import (
     api_calls,
     compiled_calls,
+    mutated_command,
     mutated_mesh,
     mutated_motion,
     mutated_obstacles,
@@ -32,6 +33,7 @@ MUTATED = (
     mutated_mesh,
     mutated_obstacles,
     mutated_study,
+    mutated_command,
     compiled_calls,
     api_calls,
 )
