@@ -280,6 +280,21 @@ def test_seams_of_a_sequence_are_marked_and_its_segments_named() -> None:
     assert [text.xy[0] for text in figure.axes[0].texts] == pytest.approx([0.3, 1.05])
 
 
+def test_names_of_segments_are_above_the_note_on_distant_limits() -> None:
+    motion = _two_segments()
+    assert motion.robot is not None
+    far = [as_limits(motion.robot, {"base": "none", "q": 1000.0}).to_dict()] * 2
+    figure = plotting.motion_figure(
+        dataclasses.replace(motion, metadata={"segment_limits": far, SEGMENT_NAMES: ["a", "b"]})
+    )
+    figure.canvas.draw()
+    ax = figure.axes[0]
+    note = ax._right_title  # type: ignore[attr-defined]
+    assert note.get_text() == "far from all limits"
+    top = note.get_window_extent().y1
+    assert all(text.get_window_extent().y0 > top for text in ax.texts)
+
+
 def test_names_of_segments_from_a_file_that_do_not_fit_are_numbers() -> None:
     motion = _two_segments()
     for names in (["a"], ["a", 3], "ab", None, {"a": 1}):

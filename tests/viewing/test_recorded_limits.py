@@ -17,8 +17,9 @@ from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError
 from hovi.planning.clearance.clearance import Clearance
 from hovi.planning.clearance.obstacles import Box, Capsule, Sphere
+from hovi.planning.problem.limits import as_limits
 from hovi.viewing.plotting import motion_figure
-from hovi.viewing.recorded_limits import imposed_clearance, with_obstacles
+from hovi.viewing.recorded_limits import imposed_clearance, imposed_limits, with_obstacles
 from hovi.viewing.replay_session import write_html
 
 BALL = Sphere([0.7, 0.0, -1.65], 0.15, name="ball")
@@ -43,6 +44,20 @@ def test_the_clearance_is_saved_with_the_motion(motion: Trajectory, tmp_path: Pa
     loaded = imposed_clearance(Trajectory.load(tmp_path / "motion.npz"))
     assert loaded is not None
     assert loaded.to_dict() == motion.metadata["clearance"]
+
+
+def test_a_motion_in_segments_is_within_the_loosest_of_their_limits(motion: Trajectory) -> None:
+    assert motion.robot is not None
+    two = [as_limits(motion.robot, {"base": "none", "v": v}).to_dict() for v in (2.0, 0.1)]
+    free = as_limits(motion.robot, {"base": "none", "tau": 9.0}).to_dict()
+
+    def recorded(*parts: Any) -> Any:
+        return imposed_limits(dataclasses.replace(motion, metadata={"segment_limits": [*parts]}))
+
+    np.testing.assert_array_equal(recorded(*two).upper, recorded(two[0]).upper)
+    assert recorded(*two, free) is None  # no bound that holds in all of them
+    for wrong in ((), (None,), ({},), (two[0], 3), ({**two[0], "lower": [[0.0]]},)):
+        assert recorded(*wrong) is None
 
 
 WEDGE = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]

@@ -22,18 +22,31 @@ _OBSTACLE_COLOR = np.array([0.75, 0.32, 0.22, 1.0])  # brick: stands out from ro
 def imposed_limits(trajectory: Trajectory) -> Limits | None:
     """The limits recorded in a motion's metadata; None where there are none.
 
+    Of a motion in segments, each with its own, the loosest, within which it is as a whole.
     Metadata may come from a file: invalid limits, or limits of another robot, count as none.
     """
     data = trajectory.metadata.get("limits")
-    if not isinstance(data, dict):
-        return None
+    of_segments = trajectory.metadata.get("segment_limits")
     try:
-        limits = Limits.from_dict(data)
+        if isinstance(data, dict):
+            limits = Limits.from_dict(data)
+        elif isinstance(of_segments, list) and of_segments:
+            limits = _loosest([Limits.from_dict(each) for each in of_segments])
+        else:
+            return None
     except (InputError, KeyError, TypeError, ValueError):
         return None
     fits = limits.lower.shape[1] == trajectory.v.shape[1]
     fits = fits and not (limits.on_rates and trajectory.grid.order < 3)
     return limits if fits and limits.bounded.any() else None
+
+
+def _loosest(parts: list[Limits]) -> Limits:
+    """The loosest bounds of any segment: none where one segment has none."""
+    parts = list(Limits.of_segments(parts, range(1, len(parts))).parts)  # of the same size
+    lower = np.min([each.lower for each in parts], axis=0)
+    upper = np.max([each.upper for each in parts], axis=0)
+    return Limits(lower, upper, max(each.tolerance for each in parts))
 
 
 def imposed_clearance(trajectory: Trajectory) -> Clearance | None:

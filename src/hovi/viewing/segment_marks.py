@@ -11,11 +11,14 @@ from hovi.discrete.trajectory import Trajectory
 
 _GRAY = "0.45"
 _LONGEST_NAME = 40
+_ABOVE_TITLE = 16.0
+"""Height in [pt] of the names where a small title is below them."""
 
 
 def draw_segments(axes: Sequence[Axes], trajectory: Trajectory) -> None:
-    """Mark where segments meet in all axes, and name them above the first."""
+    """Mark where segments meet in all axes, and name them above the first, and above its title."""
     spans = segment_spans(trajectory)
+    height = _ABOVE_TITLE if axes[0].get_title(loc="right") else 2.0
     for each in spans[1:]:
         for ax in axes:
             ax.axvline(each.begin, color=_GRAY, linewidth=0.9, linestyle=":")
@@ -23,7 +26,7 @@ def draw_segments(axes: Sequence[Axes], trajectory: Trajectory) -> None:
         axes[0].annotate(
             each.name[:_LONGEST_NAME],
             ((each.begin + each.end) / 2, 1.0),
-            (0.0, 2.0),
+            (0.0, height),
             xycoords=("data", "axes fraction"),
             textcoords="offset points",
             ha="center",

@@ -150,12 +150,13 @@ def _margins(trajectory: Trajectory) -> Iterator[Row]:
         yield "limits", "none were imposed"
     else:
         margin = closeness(trajectory, limits)
+        whose = "limits" if "limits" in trajectory.metadata else "loosest limits of any segment"
         for k, kind in enumerate(KINDS[: len(margin)]):
             if np.isfinite(margin[k]).any():
                 joint = int(np.argmin(margin[k]))
                 share = f"{100 * float(margin[k, joint]):.2g} % of the range"
                 yield (
-                    f"margin to the limits on {kind}",
+                    f"margin to the {whose} on {kind}",
                     (f"{share}, at {trajectory.coordinate_names[joint]}"),
                 )
     if kept is not None:

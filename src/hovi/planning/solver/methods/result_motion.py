@@ -20,7 +20,7 @@ def motion_of(result: MethodResult) -> Trajectory:
     }
     if problem.limits is not None and problem.limited:
         parts = problem.limits.parts
-        if parts:  # under another name: who draws limits draws one for the whole motion
+        if parts:  # under another name: `limits` are those of the whole motion
             metadata["segment_limits"] = [each.to_dict() for each in parts]
         else:
             metadata["limits"] = problem.limits.to_dict()
