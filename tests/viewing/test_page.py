@@ -256,6 +256,30 @@ def test_numbers_beside_the_scene_are_those_of_the_motion(motion: Trajectory, ta
 
 
 @needs_chromium
+def test_a_line_at_a_limit_has_the_color_of_its_joint_unless_it_is_that_of_all(
+    arm: Robot, motion: Trajectory, other_tab: Tab, tmp_path: Path
+) -> None:
+    first, second, *_ = names = arm.joint_names
+    large = 1.1 * float(np.abs(motion.sample(np.linspace(0.0, motion.duration, 99)).tau).max())
+    table = {name: large if name in (first, second) else 1e6 for name in names}
+    limits = as_limits(arm, {"base": "none", "tau": table, "v": 1e-3})
+    shown = dataclasses.replace(motion, metadata={"limits": limits.to_dict()})
+    replay(shown, html=tmp_path / "arm.html")
+    other_tab.open((tmp_path / "arm.html").as_uri())
+    other_tab.until("viewer.animator.actions.length > 0")
+    lines = other_tab.value(
+        "[...document.querySelectorAll('#torque .limit')].map(line => [Number(line.dataset.joint),"
+        " getComputedStyle(line).stroke === getComputedStyle(document.querySelector("
+        "`#torque .curve[data-joint='${line.dataset.joint}']`)).stroke])"
+    )
+    assert len(lines) in (2, 4)  # at one end of the range, or at both
+    assert {joint for joint, _ in lines} == {0, 1}
+    assert all(same for _, same in lines)
+    shared = "[...document.querySelectorAll('#velocity .limit')].map(line => line.dataset.joint)"
+    assert other_tab.value(f"{shared}.map(joint => joint === undefined)") == [True, True]
+
+
+@needs_chromium
 def test_frames_follow_the_joints(motion: Trajectory, tab: Tab) -> None:
     press(tab, "frames")
     t = 0.5 * motion.duration

@@ -209,6 +209,7 @@ class Controls {
             dot.style.background = panel.colors[i];
             const label = element("span", { class: "joint label", title: name }, dot, brief(name));
             label.onclick = () => this.only(i);
+            const rounding = 1e-9 * Math.max(...panel.tau[i].map(Math.abs));
             const scale = panel.angular[i] ? 180 / Math.PI : 1;
             const [q, tau] = [
                 this.meter(panel.q[i], panel.limits.q[i], true),
@@ -219,8 +220,8 @@ class Controls {
             return (x, y) => {
                 q.set(x);
                 tau.set(y);
-                angle.textContent = (scale * x).toFixed(scale > 1 ? 1 : 3);
-                torque.textContent = short(y);
+                angle.textContent = (scale * x).toFixed(scale > 1 ? 1 : 3).replace(/^-(0\.0+)$/, "$1");
+                torque.textContent = short(Math.abs(y) > rounding ? y : 0);
             };
         });
     }
@@ -262,7 +263,15 @@ class Controls {
         const svg = drawing("svg", { viewBox: `0 0 ${W} ${H}`, preserveAspectRatio: "none" });
         const add = (d, attributes) => svg.append(drawing("path", { d, ...attributes }));
         add(`M0 ${Y(0)} H${W}`, { class: "zero" });
-        for (const y of new Set(near.flat())) { if (y !== null) { add(`M0 ${Y(y)} H${W}`, { class: "limit" }); } }
+        const joints = new Map();  // of each limit
+        near.forEach((each, i) => each.forEach(y => { if (y !== null) { joints.set(y, [...joints.get(y) ?? [], i]); } }));
+        for (const [y, those] of joints) {
+            const shared = those.length === curves.length;  // else the dashes have the colors of the joints, in turn
+            (shared ? [null] : those).forEach((i, k) => add(`M0 ${Y(y)} H${W}`, i === null ? { class: "limit" } : {
+                class: "limit", "data-joint": i,
+                style: `stroke: ${panel.colors[i]}; stroke-dasharray: 7 ${11 * those.length - 7}; stroke-dashoffset: ${-11 * k}`,
+            }));
+        }
         all.forEach((set, k) => set.forEach((y, i) => {
             const length = k === 0 ? 1 : panel.others[k - 1].duration / panel.duration;
             const points = y.map((value, j) => `${(W * length * j / (y.length - 1)).toFixed(1)} ${Y(value)}`);
@@ -289,7 +298,7 @@ class Controls {
     // Fade the curves of all joints but one; again for all.
     only(i) {
         this.alone = this.alone === i ? null : i;
-        document.querySelectorAll(".strip .curve").forEach(path => {
+        document.querySelectorAll(".strip [data-joint]").forEach(path => {
             path.classList.toggle("faded", this.alone !== null && Number(path.dataset.joint) !== this.alone);
         });
         document.querySelectorAll(".joint").forEach((label, k) => {
