@@ -63,6 +63,7 @@ def _forces_beside_torques(scene: Scene) -> list[str]:
     limits, chosen = robot.effort_limit, forces | torques
     known = (limits[chosen] > 0).all() and (limits[chosen] < 1e6).all()
     how = (
+        "hovi.effects.EffortWeight(from_urdf=True) or, in a scene file, "
         "[effects.effort_weight] from_urdf = true divides each by its effort limit"
         if known
         else "give weights with the effect effort_weight"
