@@ -46,6 +46,10 @@ class CentralPath:
         """The solution."""
         return self.points[-1][1]
 
+    def fits(self, grid: Grid) -> bool:
+        """Whether it is on as many intervals as a grid."""
+        return len(self.last.z) == grid.intervals
+
     def at(self, level: float) -> tuple[float, DiscretePath]:
         """The last point whose parameter is at least a level; the first if there is none."""
         large = [point for point in self.points if point[0] >= level]

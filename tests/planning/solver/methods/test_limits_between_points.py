@@ -66,3 +66,21 @@ def test_a_solve_of_several_rounds_keeps_the_beginning_of_its_central_path(
     assert levels[0] > 0.01
     shapes = {x.inner.shape for _, x in found.central.points}
     assert shapes == {found.trajectory.path.inner.shape}
+
+
+def test_a_replanned_motion_may_need_its_intervals_halved(
+    arm_scene: Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What is known of the last motion, on its whole intervals, is of no use on the halves."""
+    ld = DiscreteLagrangian(arm_scene.effort_lagrangian(), Grid.uniform(1.0, 8, galerkin(1)))
+    limits = as_limits(arm_scene.robot, {"base": "none", "tau": 9.0})
+    found = solve_on_grid(TrajectoryProblem(ld, State(HANG), State(REACH_Q, REACH_V), limits))
+    assert found.central is not None
+    monkeypatch.setattr(limits_between_points, "HALVING_EXCESS", 0.0)
+    monkeypatch.setattr(limits_between_points, "WARM_EXCESS", -1.0)
+    moved = found.replan(goal=State(np.add(REACH_Q, 0.05), REACH_V))
+    assert moved.problem is not None
+    assert found.problem is not None
+    assert moved.problem.grid.intervals > found.problem.grid.intervals
+    assert moved.success
+    assert excess_along(moved.trajectory, limits).worst <= 1e-6

@@ -114,6 +114,8 @@ class BoundedSearch:
             else:
                 self.clearance = ClearanceOutputs(distances, self.bounded_distance)
         self.margins = self.no_margins()
+        if self.along is not None and not self.along.fits(self.problem.grid):
+            self.along = None  # a round before has halved intervals
         known = None if self.along is None else self.along.rows
         self.rows = self.coarse_rows() if known is None else known.copied()
         self.tightened: tuple[Array, Array] | None = None

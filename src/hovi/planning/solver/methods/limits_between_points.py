@@ -130,7 +130,7 @@ def _solved_on_halves(search: BoundedSearch, outcome: Bounded, sides: Array) -> 
     )
     search.problem = search.problem.on(grid.halved(chosen))
     search.guess = search.problem.path(guess)
-    search.multipliers = None
+    search.multipliers, search.along = None, None
     search.margins, search.tightened = search.no_margins(), None
     search.rows = search.coarse_rows()
     if search.near is not None:
