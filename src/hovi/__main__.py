@@ -23,6 +23,8 @@ NEW_OBJECTS = 200_000
 a tenth of its time: what it imports stays."""
 INTERRUPTION_MODULE = "hovi.system.interruption"
 """The module that records interrupts raised where Python drops exceptions, as in a destructor."""
+WEAK_REFERENCES = "weakref.py", "_weakrefset.py"
+"""Files of Python whose functions are called when an object goes; it drops their exceptions."""
 RETRY_DELAY = 0.05
 """Delay in [s] before Ctrl-C is raised again, if it came during an import within a run."""
 
@@ -62,8 +64,8 @@ def run() -> None:
 def _handle_interrupt(number: int, frame: FrameType | None) -> None:
     """Handle Ctrl-C: exit at once during the imports of a command, before any work is done.
 
-    Otherwise raises KeyboardInterrupt. A module imported in the middle of a run may swallow it, so
-    there the interrupt is raised again after the import.
+    Otherwise raises KeyboardInterrupt. A module imported in the middle of a run may swallow it, and
+    Python prints and drops it where an object goes, so there the interrupt is raised again later.
     """
     extension = sys.modules.get(EXTENSION_MODULE)
     if extension is not None and hasattr(extension, "ignore_leaks"):  # completely imported
@@ -73,7 +75,10 @@ def _handle_interrupt(number: int, frame: FrameType | None) -> None:
         interruption = sys.modules.get(INTERRUPTION_MODULE)
         if interruption is not None:
             interruption.record_interrupt()
-        raise KeyboardInterrupt
+        if not _drops_exceptions(frame):
+            raise KeyboardInterrupt
+        start_new_thread(_interrupt_later, ())
+        return
     if not any(map(_is_library_frame, _callers(importer))):
         os._exit(_flush_output(EXIT_INTERRUPTED))  # no work to finish
     # Not a Timer, which takes locks that the interrupted code may hold.
@@ -83,6 +88,14 @@ def _handle_interrupt(number: int, frame: FrameType | None) -> None:
 def _interrupt_later() -> None:
     time.sleep(RETRY_DELAY)
     interrupt_main()
+
+
+def _drops_exceptions(frame: FrameType | None) -> bool:
+    """Whether Python calls this code when an object goes."""
+    if frame is None:
+        return False
+    code = frame.f_code
+    return code.co_name == "__del__" or code.co_filename.endswith(WEAK_REFERENCES)
 
 
 def _importing_frame(frame: FrameType | None) -> FrameType | None:

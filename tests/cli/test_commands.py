@@ -405,6 +405,32 @@ def test_an_interrupt_during_the_first_imports_ends_the_command(module: str) -> 
     assert interrupted_import(module, "plan", "two_link_reach") == (130, "", "")
 
 
+AS_A_WEAK_REFERENCE_GOES = """
+import os, signal, sys, time, weakref
+from hovi import __main__ as entry
+
+signal.signal(signal.SIGINT, entry._handle_interrupt)
+code = compile("def remove(_): os.kill(os.getpid(), signal.SIGINT)", weakref.__file__, "exec")
+exec(code)
+
+class Thing:
+    pass
+
+try:
+    reference = weakref.ref(Thing(), remove)
+    time.sleep(20)
+except KeyboardInterrupt:
+    sys.exit(7)
+"""
+
+
+def test_an_interrupt_where_python_drops_exceptions_comes_after_it() -> None:
+    """It was printed as ignored, with a traceback, and the command went on."""
+    command = [sys.executable, "-c", AS_A_WEAK_REFERENCE_GOES]
+    done = subprocess.run(command, capture_output=True, timeout=60, check=False)
+    assert (done.returncode, done.stderr.decode()) == (7, "")
+
+
 # Describing robots and scenes, and showing motions
 
 
