@@ -23,8 +23,8 @@ NEW_OBJECTS = 200_000
 a tenth of its time: what it imports stays."""
 INTERRUPTION_MODULE = "hovi.system.interruption"
 """The module that records interrupts raised where Python drops exceptions, as in a destructor."""
-WEAK_REFERENCES = "weakref.py", "_weakrefset.py"
-"""Files of Python whose functions are called when an object goes; it drops their exceptions."""
+WEAK_REFERENCES = "weakref", "_weakrefset"
+"""Modules whose functions Python calls when an object goes; it drops their exceptions."""
 RETRY_DELAY = 0.05
 """Delay in [s] before Ctrl-C is raised again, if it came during an import within a run."""
 
@@ -94,8 +94,8 @@ def _drops_exceptions(frame: FrameType | None) -> bool:
     """Whether Python calls this code when an object goes."""
     if frame is None:
         return False
-    code = frame.f_code
-    return code.co_name == "__del__" or code.co_filename.endswith(WEAK_REFERENCES)
+    module = frame.f_globals.get("__name__")
+    return frame.f_code.co_name == "__del__" or module in WEAK_REFERENCES
 
 
 def _importing_frame(frame: FrameType | None) -> FrameType | None:

@@ -406,18 +406,18 @@ def test_an_interrupt_during_the_first_imports_ends_the_command(module: str) -> 
 
 
 AS_A_WEAK_REFERENCE_GOES = """
-import os, signal, sys, time, weakref
+import signal, sys, time, weakref
 from hovi import __main__ as entry
 
 signal.signal(signal.SIGINT, entry._handle_interrupt)
-code = compile("def remove(_): os.kill(os.getpid(), signal.SIGINT)", weakref.__file__, "exec")
-exec(code)
+there = {"__name__": "weakref", "signal": signal}
+exec("def remove(_): signal.raise_signal(signal.SIGINT)", there)
 
 class Thing:
     pass
 
 try:
-    reference = weakref.ref(Thing(), remove)
+    reference = weakref.ref(Thing(), there["remove"])
     time.sleep(20)
 except KeyboardInterrupt:
     sys.exit(7)
