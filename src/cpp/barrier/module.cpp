@@ -46,6 +46,10 @@ double* vector(const char* name, std::size_t R, const Out& x) {
   return x.data();
 }
 
+Direction new_slacks_of(std::size_t R, const Out& s, const Out& zl, const Out& zu) {
+  return {vector("new_s", R, s), vector("new_zl", R, zl), vector("new_zu", R, zu)};
+}
+
 void require_share(double keep) {
   if (!(keep >= 0.0)) refuse("keep must be a share of the gaps, 0 or more.");
 }
@@ -132,8 +136,7 @@ void move(const Vector& lower, const Vector& upper, const Vector& s, const Vecto
   if (!(mu >= 0.0 && ratio >= 1.0)) refuse("mu must be 0 or more, and ratio 1 or more.");
   const Slacks at = slacks_of(lower, upper, s, zl, zu);
   const std::size_t R = at.count;
-  const Direction out{vector("new_s", R, new_s), vector("new_zl", R, new_zl),
-                      vector("new_zu", R, new_zu)};
+  const Direction out = new_slacks_of(R, new_s, new_zl, new_zu);
   hovi::barrier::move(at, vector("y", R, y), direction_of(R, ds, dzl, dzu), primal, dual, keep, mu,
                       penalty, ratio, out);
 }
@@ -148,8 +151,7 @@ void recenter(const Vector& lower, const Vector& upper, const Vector& s, const V
   require_central(c, mu);
   const Slacks at = slacks_of(lower, upper, s, zl, zu);
   const std::size_t R = at.count;
-  const Direction out{vector("new_s", R, new_s), vector("new_zl", R, new_zl),
-                      vector("new_zu", R, new_zu)};
+  const Direction out = new_slacks_of(R, new_s, new_zl, new_zu);
   hovi::barrier::recenter(at, c, mu, out);
 }
 
@@ -161,8 +163,7 @@ std::tuple<double, double> follow(const Vector& lower, const Vector& upper, cons
   require_central(least, next_mu);
   const Slacks at = slacks_of(lower, upper, s, zl, zu);
   const std::size_t R = at.count;
-  const Direction out{vector("new_s", R, new_s), vector("new_zl", R, new_zl),
-                      vector("new_zu", R, new_zu)};
+  const Direction out = new_slacks_of(R, new_s, new_zl, new_zu);
   const auto misses = hovi::barrier::follow(at, vector("weights", R, weights), vector("y", R, y),
                                             vector("dy", R, dy), vector("y_new", R, y_new), mu,
                                             next_mu, least, out);

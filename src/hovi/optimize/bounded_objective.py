@@ -135,6 +135,11 @@ class BoundedOutcome(Generic[X]):
     marks: list[tuple[float, X]] = field(default_factory=list)
     kept: tuple[X, Outputs] | None = None
 
+    @property
+    def converged(self) -> bool:
+        """Whether it ended at a stationary point within the bounds."""
+        return self.feasible and self.stop is Stop.STATIONARY
+
     @contextmanager
     def recorded_end(self, time_limit: float | None) -> Iterator[None]:
         """An iteration whose end by its time limit, by Ctrl-C or by arithmetic becomes `stop`.

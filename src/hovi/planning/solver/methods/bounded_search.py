@@ -12,7 +12,7 @@ from hovi.discrete.grid import DiscretePath
 from hovi.discrete.instants import Instants
 from hovi.discrete.state import State
 from hovi.optimize.banded_model import BandModel
-from hovi.optimize.barrier import WARM_START_MARGIN, Barrier
+from hovi.optimize.barrier import INITIAL_MARGIN, WARM_START_MARGIN, Barrier
 from hovi.optimize.bordered_model import EquationModel
 from hovi.optimize.bounded_objective import BoundedOutcome, Outputs
 from hovi.optimize.interior_point import minimize_bounded
@@ -63,6 +63,8 @@ FINE_HALVINGS = 2, 3
 WARM_MU_RANGE = 1e-7, 1e-4
 """Range of the initial barrier parameter of a warm start, relative to the mean density."""
 
+LEVEL_MARGIN = 0.1
+"""Distance of slacks from their bounds at a point of a central path, relative to its parameter."""
 LOOK_AROUND = 0.02
 """Distance beyond the least one up to which pairs near a known motion get rows, in [m]."""
 
@@ -242,6 +244,18 @@ class BoundedSearch:
         rounds = minimize_constrained(self.problem, path, minimize_round, self.multipliers)
         self.multipliers, self.unmet = rounds.multipliers, rounds.reason
         return rounds.result
+
+    def solve_at_level(self, path: DiscretePath, level: float) -> Bounded:
+        """Solve from a point of a central path, or one near it.
+
+        level: its barrier parameter, relative to the mean density of the objective.
+        """
+        objective = self.objective(self.multipliers)
+        outputs = objective.outputs(path)
+        density = mean_density(outputs, objective.bounds.measure)
+        margin = min(INITIAL_MARGIN, LEVEL_MARGIN * level)
+        start = Barrier.central(objective.bounds, outputs.y, level * density, density, margin)
+        return self.solve(path, start)
 
     def _solved_under_conditions(self, path: DiscretePath, start: Barrier | None) -> Bounded | None:
         """A solve whose steps meet the conditions at nodes; None where that fails."""

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from hovi.discrete.grid import DiscretePath
-from hovi.optimize.barrier import INITIAL_MARGIN, Barrier
+from hovi.optimize.barrier import Barrier
 from hovi.optimize.trust_region import Stop
 from hovi.planning.problem.limits import no_limits
 from hovi.planning.solver.action_objective import ActionObjective
@@ -55,8 +55,6 @@ LEG_LEVELS = 3e-4, 1e-2
 """Barrier parameters at which the legs of a motion are joined, relative to the cost's mean density,
 the second where the first one fails: small enough that each stays where it is, and large enough for
 the accelerations at the seams."""
-LEG_MARGIN = 0.1
-"""Distance of slacks from their bounds then, relative to it."""
 LEG_AHEAD = 0.005
 """Distance beyond the least one up to which pairs get rows then, in [m]."""
 DETOUR = 1.05
@@ -102,14 +100,14 @@ def _by_legs(search: BoundedSearch, guess: DiscretePath) -> Bounded | None:
         outcome = cleared_motion(part, part.guess)
         search.iterations += part.iterations
         search.history += part.history
-        if not _is_solved(outcome):
+        if not outcome.converged:
             return None
         parts.append(part)
         known.append(part.central_path(outcome))
     for level in LEG_LEVELS if legs else ():
         path = joined(legs, [each.at(level)[1] for each in known])
         outcome = _from_legs(search, legs, parts, path, level)
-        if _is_solved(outcome) or outcome.stop in STOPPED:
+        if outcome.converged or outcome.stop in STOPPED:
             return outcome
     return None
 
@@ -133,16 +131,7 @@ def _from_legs(
     search.rows, search.near = search.coarse_rows(), search.no_near_rows()
     search.near.take(near)
     search.near.extend(search.problem, path, LEG_AHEAD)
-    objective = search.objective(search.multipliers)
-    outputs = objective.outputs(path)
-    density = mean_density(outputs, objective.bounds.measure)
-    margin = min(LEG_MARGIN * level, INITIAL_MARGIN)
-    start = Barrier.central(objective.bounds, outputs.y, level * density, density, margin)
-    return search.solve(path, start)
-
-
-def _is_solved(outcome: Bounded) -> bool:
-    return outcome.feasible and outcome.stop is Stop.STATIONARY
+    return search.solve_at_level(path, level)
 
 
 def _without_distances(search: BoundedSearch, guess: DiscretePath) -> Bounded:

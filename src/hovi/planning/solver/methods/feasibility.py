@@ -9,7 +9,7 @@ import numpy as np
 
 from hovi.discrete.grid import DiscretePath
 from hovi.discrete.guess import stretched, with_bump
-from hovi.optimize.barrier import INITIAL_MARGIN, Barrier
+from hovi.optimize.barrier import Barrier
 from hovi.optimize.bounded_objective import Outputs
 from hovi.optimize.trust_region import Options, Stop, minimize
 from hovi.planning.clearance.clearance_violation import approach_along
@@ -67,8 +67,6 @@ WARM_MARGIN = 1e-6
 """Least distance of its slacks from their bounds."""
 WARM_STEPS = 100
 """Maximum number of steps from a motion that nearly is a solution, without obstacles."""
-SHIFT_MARGIN = 0.1
-"""Distance of slacks from their bounds at a point of a central path, relative to its parameter."""
 SAME_VIOLATION = 1.5
 """Ratio of the squares up to which two minima of the violation are taken as one."""
 BUMP_SHARE = 0.3
@@ -112,7 +110,7 @@ def _solved_nearby(search: BoundedSearch, path: DiscretePath) -> Bounded | None:
     along = search.along
     outcome = solved_from(search, path) if along is None else _solved_along(search, along)
     search.options = whole
-    return outcome if _is_found(outcome) or outcome.stop in STOPPED else None
+    return outcome if outcome.converged or outcome.stop in STOPPED else None
 
 
 def _solved_at_all(search: BoundedSearch, path: DiscretePath) -> Bounded:
@@ -120,10 +118,6 @@ def _solved_at_all(search: BoundedSearch, path: DiscretePath) -> Bounded:
         return search.solve(path)
     search.near = search.no_near_rows()
     return cleared_motion(search, path)
-
-
-def _is_found(outcome: Bounded) -> bool:
-    return outcome.feasible and outcome.stop is Stop.STATIONARY
 
 
 def _solved_along(search: BoundedSearch, along: CentralPath) -> Bounded:
@@ -140,7 +134,7 @@ def _solved_along(search: BoundedSearch, along: CentralPath) -> Bounded:
         level = float(np.clip(SHIFT_LEVEL * shift, *SHIFT_LEVELS))
         if along.barrier is not None and shift <= WARM_SHIFT:
             outcome = _solved_warm(search, along.barrier, moved)
-            if _is_found(outcome) or outcome.stop in STOPPED:
+            if outcome.converged or outcome.stop in STOPPED:
                 return outcome
             _adopt(search, along)
     return _solved_from_level(search, along, level)
@@ -166,7 +160,7 @@ def follow(problem: TrajectoryProblem, along: CentralPath, barrier: float) -> Ce
     search = BoundedSearch(problem, limits, Options(barrier=barrier), None, along.last, along=along)
     _adopt(search, along)
     outcome = _followed(search, along)
-    if outcome is None or not _is_found(outcome):
+    if outcome is None or not outcome.converged:
         return None
     return search.central_path(outcome)
 
@@ -187,7 +181,7 @@ def _followed(search: BoundedSearch, along: CentralPath) -> Bounded | None:
         max_iterations=min(NEWTON_STEPS, search.options.max_iterations),
     )
     outcome = search.followed(objective, moved, known, options)
-    if _is_found(outcome) or outcome.stop in STOPPED:
+    if outcome.converged or outcome.stop in STOPPED:
         return outcome
     _adopt(search, along)
     return None
@@ -222,12 +216,7 @@ def _solved_from_level(search: BoundedSearch, along: CentralPath, level: float) 
     problem, (share, point) = search.problem, along.at(level)
     path = problem.moved(point)
     search.look_around(path)
-    objective = search.objective(search.multipliers)
-    outputs = objective.outputs(path)
-    density = mean_density(outputs, objective.bounds.measure)
-    margin = min(INITIAL_MARGIN, SHIFT_MARGIN * share)
-    start = Barrier.central(objective.bounds, outputs.y, share * density, density, margin)
-    return search.solve(path, start)
+    return search.solve_at_level(path, share)
 
 
 def solved_from(search: BoundedSearch, path: DiscretePath) -> Bounded:
@@ -247,7 +236,7 @@ def _solved_beside_obstacles(
     if float(given.distance.min()) < wanted.least:
         return None
     outcome = solved_from(search, path)
-    return outcome if _is_found(outcome) or outcome.stop in STOPPED else None
+    return outcome if outcome.converged or outcome.stop in STOPPED else None
 
 
 def _moved_out_of_obstacles(
