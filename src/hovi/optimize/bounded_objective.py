@@ -25,6 +25,9 @@ X = TypeVar("X")
 FEASIBILITY_TOLERANCE = 1e-8
 """Largest |y - s| of a solution, relative to the range of a bound."""
 
+STOPPED = Stop.TIME_LIMIT, Stop.INTERRUPTED
+"""Reasons that end the whole search."""
+
 KEPT = 1e-6
 """Excess over a bound, relative to its range, up to which a point keeps it."""
 
@@ -139,6 +142,11 @@ class BoundedOutcome(Generic[X]):
     def converged(self) -> bool:
         """Whether it ended at a stationary point within the bounds."""
         return self.feasible and self.stop is Stop.STATIONARY
+
+    @property
+    def settled(self) -> bool:
+        """Whether no further attempt is to be made: it converged, or was stopped."""
+        return self.converged or self.stop in STOPPED
 
     @contextmanager
     def recorded_end(self, time_limit: float | None) -> Iterator[None]:

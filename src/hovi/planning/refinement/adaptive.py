@@ -26,6 +26,8 @@ from hovi.planning.refinement.nearby_minimum import nearby_minimum
 from hovi.planning.refinement.next_grid import MAX_ERROR_OF_DECAY, interpolated_to, next_grid
 from hovi.planning.refinement.whirling import MAX_WORK
 from hovi.planning.solver.action_objective import ActionObjective
+from hovi.planning.solver.central_path import CentralPath
+from hovi.planning.solver.methods.method import Method
 from hovi.planning.solver.solver import Solution, solve_on_grid
 from hovi.planning.solver.status import Status
 from hovi.schemes import galerkin
@@ -51,6 +53,8 @@ MAX_ROUNDS = 14
 """Maximum number of grids."""
 MAX_STALLED_ROUNDS = 2
 """Consecutive rounds without an error smaller by half after which the refinement ends."""
+LEVEL = 1e-3
+"""Barrier parameter at which a solve on another grid begins among obstacles."""
 MAX_POINTS = 400_000
 """Number of quadrature points of a grid above which no finer one is tried."""
 
@@ -221,8 +225,9 @@ class _Search:
         assert problem is not None
         grid = next_grid(candidate)
         if finer is None:
-            fine = problem.on(grid)
-            return self._evaluated(self._solved(fine, candidate.solution.trajectory, candidate))
+            fine, known = problem.on(grid), candidate.solution
+            along = _along(known.central, problem, fine)
+            return self._evaluated(self._solved(fine, known.trajectory, candidate, along))
         if grid is finer.problem.grid:
             solution = finer.finish()
             fine = finer.problem
@@ -230,13 +235,21 @@ class _Search:
             fine = problem.on(grid)
             solution = _solved_nearby(finer, fine)
         if solution is None:
-            solution = self._solved(fine, interpolated_to(finer, fine), candidate)
+            along = _along(finer.central, finer.problem, fine)
+            solution = self._solved(fine, interpolated_to(finer, fine), candidate, along)
         return self._evaluated(solution)
 
     def _solved(
-        self, problem: TrajectoryProblem, guess: Trajectory | DiscretePath, last: Candidate
+        self,
+        problem: TrajectoryProblem,
+        guess: Trajectory | DiscretePath,
+        last: Candidate,
+        along: Method | None,
     ) -> Solution:
-        """Solve with the remaining time, from the last candidate's motion or a finer one."""
+        """Solve with the remaining time, from the last candidate's motion or a finer one.
+
+        along: follows the central path of that motion; None without one.
+        """
         steps = self.max_iterations
         if last.whirl is not None:
             steps = min(steps, MAX_WORK // problem.grid.intervals)
@@ -248,6 +261,7 @@ class _Search:
                 guess,
                 max_iterations=steps,
                 time_limit=self.deadline.seconds_left,
+                method=along,
                 near=near,
                 barrier=self.tolerance.barrier,
             )
@@ -297,6 +311,22 @@ class _Search:
     @property
     def _frame(self) -> str | None:
         return self.tolerance.frame
+
+
+def _along(
+    central: CentralPath | None, known: TrajectoryProblem, problem: TrajectoryProblem
+) -> Method | None:
+    """A method that follows a central path on another grid; None without one, or obstacles.
+
+    A solution has pairs at their least distances, where every step ends; the point of the path with
+    a larger barrier has room.
+    known: the problem whose central path it is.
+    """
+    if central is None or problem.distances is None:
+        return None
+    from hovi.planning.solver.methods.interior_point import InteriorPoint  # 10 ms
+
+    return InteriorPoint(central.resampled(known, problem), LEVEL)
 
 
 def _hides(candidate: Candidate) -> bool:

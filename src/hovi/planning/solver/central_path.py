@@ -8,7 +8,9 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.discrete.grid import DiscretePath, Grid
+from hovi.discrete.guess import stretched
 from hovi.optimize.barrier import Barrier
+from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.limits.limit_rows import LimitRows
 from hovi.planning.solver.near.clearance_rows import ClearanceRows
 from hovi.system.dataclass import dataclass
@@ -28,6 +30,7 @@ class CentralPath:
     barrier: slacks and multipliers of the solution, at the points and in the rows; None for none.
     margins: by which its bounds are tightened at the points: see BoundedAction; None for none.
     near: rows of distances; None to find them anew.
+    conditions: multipliers of the conditions at nodes; None for none.
     """
 
     points: tuple[tuple[float, DiscretePath], ...]
@@ -35,6 +38,7 @@ class CentralPath:
     barrier: Barrier | None = None
     margins: Array | None = None
     near: ClearanceRows | None = None
+    conditions: tuple[Array, ...] | None = None
 
     @property
     def level(self) -> float:
@@ -64,7 +68,20 @@ class CentralPath:
         rows = None if self.rows is None else self.rows.fixed_on(grid)
         near = None if self.near is None else self.near.copied(fixed=True)
         levels = (level for level, _ in self.points)
-        return CentralPath(tuple(zip(levels, paths, strict=True)), rows, near=near)
+        points = tuple(zip(levels, paths, strict=True))
+        return CentralPath(points, rows, near=near, conditions=self.conditions)
+
+    def resampled(self, own: TrajectoryProblem, other: TrajectoryProblem) -> CentralPath:
+        """The same curves on the grid of another problem, whose rows are to be found anew.
+
+        own: the problem that it belongs to.
+        """
+        T, k = other.grid.duration, other.ld.k
+        points = tuple(
+            (level, other.path(stretched(own.trajectory(path), T, k)))
+            for level, path in self.points
+        )
+        return CentralPath(points, None, conditions=self.conditions)
 
     def freed(self) -> CentralPath:
         """The same with rows that may be refined."""

@@ -11,14 +11,14 @@ import dataclasses
 from hovi.discrete.grid import DiscretePath
 from hovi.optimize.barrier import Barrier
 from hovi.optimize.bordered_model import BorderedModel
-from hovi.optimize.bounded_objective import BoundedOutcome, Outputs
+from hovi.optimize.bounded_objective import STOPPED, BoundedOutcome, Outputs
 from hovi.optimize.interior_point import minimize_bounded
 from hovi.optimize.trust_region import Options, Stop
 from hovi.planning.problem.limits import Limits
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.free_duration.timed_bounded_action import TimedBoundedAction
 from hovi.planning.solver.free_duration.timed_path import TimedPath, TimePrice, stretched_path
-from hovi.planning.solver.methods.bounded_search import STOPPED, Bounded, BoundedSearch
+from hovi.planning.solver.methods.bounded_search import Bounded, BoundedSearch
 from hovi.planning.solver.methods.feasibility import solved_from
 from hovi.planning.solver.methods.limits_between_points import tightened, usable
 from hovi.planning.solver.methods.method import MethodResult

@@ -52,8 +52,6 @@ from hovi.system.deadline import Deadline, raise_if_late
 Array = npt.NDArray[np.float64]
 Bounded = BoundedOutcome[DiscretePath]
 
-STOPPED = Stop.TIME_LIMIT, Stop.INTERRUPTED
-"""Reasons that end the whole search."""
 ROUND_BARRIER = 3e-7
 """Least last barrier parameter in rounds of an augmented Lagrangian, relative to the density."""
 FIRST_HALVINGS = 0, 1
@@ -196,7 +194,9 @@ class BoundedSearch:
         points = (*before, (last, outcome.x))
         apart = self.problem.distances is None or (self.near is not None and self.near.size == 0)
         barrier = outcome.barrier if apart else None
-        return CentralPath(points, self.rows, barrier, self.margins, self.near)
+        known = None if len(self.problem.passive) > 0 else self.multipliers
+        conditions = None if known is None else tuple(known.nodes)
+        return CentralPath(points, self.rows, barrier, self.margins, self.near, conditions)
 
     def _add_points(self, outcome: Bounded, objective: BoundedAction) -> None:
         """Add the points at which the barrier of a solve was larger to those of earlier solves.

@@ -9,6 +9,7 @@ import numpy as np
 
 from hovi.discrete.grid import DiscretePath
 from hovi.optimize.barrier import Barrier
+from hovi.optimize.bounded_objective import STOPPED
 from hovi.optimize.trust_region import Stop
 from hovi.planning.problem.limits import no_limits
 from hovi.planning.solver.action_objective import ActionObjective
@@ -19,7 +20,6 @@ from hovi.planning.solver.augmented_lagrangian_rounds import (
 from hovi.planning.solver.central_path import CentralPath
 from hovi.planning.solver.limits.limit_rows import LimitRows
 from hovi.planning.solver.methods.bounded_search import (
-    STOPPED,
     Bounded,
     BoundedSearch,
     mean_density,
@@ -107,7 +107,7 @@ def _by_legs(search: BoundedSearch, guess: DiscretePath) -> Bounded | None:
     for level in LEG_LEVELS if legs else ():
         path = joined(legs, [each.at(level)[1] for each in known])
         outcome = _from_legs(search, legs, parts, path, level)
-        if outcome.converged or outcome.stop in STOPPED:
+        if outcome.settled:
             return outcome
     return None
 

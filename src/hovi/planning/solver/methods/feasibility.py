@@ -10,7 +10,7 @@ import numpy as np
 from hovi.discrete.grid import DiscretePath
 from hovi.discrete.guess import stretched, with_bump
 from hovi.optimize.barrier import Barrier
-from hovi.optimize.bounded_objective import Outputs
+from hovi.optimize.bounded_objective import STOPPED, Outputs
 from hovi.optimize.trust_region import Options, Stop, minimize
 from hovi.planning.clearance.clearance_violation import approach_along
 from hovi.planning.problem.limits import no_limits
@@ -21,7 +21,6 @@ from hovi.planning.solver.bounded_action import BoundedAction
 from hovi.planning.solver.central_path import CentralPath
 from hovi.planning.solver.clearance_outputs import ClearanceOutputs
 from hovi.planning.solver.methods.bounded_search import (
-    STOPPED,
     Bounded,
     BoundedSearch,
     mean_density,
@@ -109,8 +108,12 @@ def _solved_nearby(search: BoundedSearch, path: DiscretePath) -> Bounded | None:
         search.options = dataclasses.replace(whole, max_iterations=most)
     along = search.along
     outcome = solved_from(search, path) if along is None else _solved_along(search, along)
+    if along is not None and along.rows is None and not outcome.settled:
+        search.rows, search.multipliers = search.coarse_rows(), None
+        search.near = None if search.near is None else search.no_near_rows()
+        outcome = solved_from(search, path)
     search.options = whole
-    return outcome if outcome.converged or outcome.stop in STOPPED else None
+    return outcome if outcome.settled else None
 
 
 def _solved_at_all(search: BoundedSearch, path: DiscretePath) -> Bounded:
@@ -134,20 +137,24 @@ def _solved_along(search: BoundedSearch, along: CentralPath) -> Bounded:
         level = float(np.clip(SHIFT_LEVEL * shift, *SHIFT_LEVELS))
         if along.barrier is not None and shift <= WARM_SHIFT:
             outcome = _solved_warm(search, along.barrier, moved)
-            if outcome.converged or outcome.stop in STOPPED:
+            if outcome.settled:
                 return outcome
             _adopt(search, along)
     return _solved_from_level(search, along, level)
 
 
 def _adopt(search: BoundedSearch, along: CentralPath) -> None:
-    """Take over the rows and the tightened bounds of a similar problem on as many intervals."""
+    """Take over the rows, bounds and multipliers of a similar problem on as many intervals."""
     if along.rows is not None:
         search.rows = along.rows.copied()
     if along.near is not None and search.near is not None:
         search.near = along.near.on(search.problem)
     if along.margins is not None and along.margins.shape == search.margins.shape:
         search.margins = along.margins
+    if along.conditions is not None:
+        known = first_multipliers(search.problem, along.last)
+        if [len(each) for each in known.nodes] == [len(each) for each in along.conditions]:
+            search.multipliers = dataclasses.replace(known, nodes=list(along.conditions))
 
 
 def follow(problem: TrajectoryProblem, along: CentralPath, barrier: float) -> CentralPath | None:
@@ -181,7 +188,7 @@ def _followed(search: BoundedSearch, along: CentralPath) -> Bounded | None:
         max_iterations=min(NEWTON_STEPS, search.options.max_iterations),
     )
     outcome = search.followed(objective, moved, known, options)
-    if outcome.converged or outcome.stop in STOPPED:
+    if outcome.settled:
         return outcome
     _adopt(search, along)
     return None
@@ -215,6 +222,8 @@ def _solved_from_level(search: BoundedSearch, along: CentralPath, level: float) 
     """Solve from the point of a central path with a barrier as large as a level."""
     problem, (share, point) = search.problem, along.at(level)
     path = problem.moved(point)
+    if along.rows is None:
+        search.rows.refine(path, share)
     search.look_around(path)
     return search.solve_at_level(path, share)
 
@@ -236,7 +245,7 @@ def _solved_beside_obstacles(
     if float(given.distance.min()) < wanted.least:
         return None
     outcome = solved_from(search, path)
-    return outcome if outcome.converged or outcome.stop in STOPPED else None
+    return outcome if outcome.settled else None
 
 
 def _moved_out_of_obstacles(

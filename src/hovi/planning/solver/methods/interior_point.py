@@ -8,13 +8,14 @@ from functools import partial
 import numpy as np
 
 from hovi.discrete.grid import DiscretePath
+from hovi.optimize.bounded_objective import STOPPED
 from hovi.optimize.trust_region import Options, Stop
 from hovi.planning.problem.contradictions import contradiction
 from hovi.planning.problem.limits import no_limits
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.central_path import CentralPath
 from hovi.planning.solver.methods.active_pairs import with_active_pairs
-from hovi.planning.solver.methods.bounded_search import STOPPED, BoundedSearch
+from hovi.planning.solver.methods.bounded_search import BoundedSearch
 from hovi.planning.solver.methods.feasibility import feasible_motion
 from hovi.planning.solver.methods.limits_between_points import tightened, usable
 from hovi.planning.solver.methods.method import Method, MethodResult, Report

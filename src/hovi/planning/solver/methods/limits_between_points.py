@@ -6,9 +6,9 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.discrete.guess import stretched
+from hovi.optimize.bounded_objective import STOPPED
 from hovi.optimize.trust_region import Stop
 from hovi.planning.solver.methods.bounded_search import (
-    STOPPED,
     WARM_MU_RANGE,
     Bounded,
     BoundedSearch,
