@@ -27,9 +27,9 @@ one of the cost, asks to improve."""
 LAST_BARRIER = 1e-8
 """Last barrier parameter within limits where nothing else is asked for, relative to the mean
 density of the cost, which exceeds its minimum by some ten times as much."""
-BARRIER_SHARE, LARGEST_BARRIER = 1e-3, 1e-6
+BARRIER_SHARE, LARGEST_BARRIER = 3e-3, 3e-6
 """The same for a tolerance of the cost, as a share of it, and at most."""
-REMAINING_SHARE = 0.1
+REMAINING_SHARE = 0.5
 """Predicted relative decrease of the last step within limits, as a share of the last barrier."""
 
 

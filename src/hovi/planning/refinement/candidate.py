@@ -42,6 +42,8 @@ HAMILTONIAN_ERROR_SHARE = 0.1
 """Relative error of the cost that is inferred from the nodal Hamiltonian, over its spread."""
 ROUNDING_FLOOR = 1e-14
 """Smallest estimate of the relative error of the cost."""
+BARRIER_EXCESS = 10.0
+"""Relative excess of a cost over its minimum per barrier parameter."""
 LOOSE_SAFETY_FACTOR = 3.0
 """Factor on estimates above CURVE_TOLERANCE, where the finer solution is not much better."""
 CONTRADICTION_RATIO = 10.0
@@ -207,7 +209,7 @@ def _trusted(uncancelled: float, tolerance: Tolerance) -> bool:
 
 
 def error_of_cost(solution: Solution, finer: FinerSolution) -> float:
-    """Relative error of the cost, with the effect of the limits' tolerance on it.
+    """Relative error of the cost, with the effects of the limits' tolerance and of a barrier on it.
 
     Not below ROUNDING_FLOOR; 0 for zero cost with zero error.
     """
@@ -217,10 +219,22 @@ def error_of_cost(solution: Solution, finer: FinerSolution) -> float:
     problem = solution.problem
     assert problem is not None
     if problem.limited:
-        error *= LIMITED_SAFETY_FACTOR
+        error = LIMITED_SAFETY_FACTOR * error + _excess_of_bounds(solution)
     elif error > CURVE_TOLERANCE:
         error *= LOOSE_SAFETY_FACTOR
     return max(error + cost_of_tolerance(solution), ROUNDING_FLOOR)
+
+
+def _excess_of_bounds(solution: Solution) -> float:
+    """By what share a cost may exceed its minimum, beyond MAX_LOSS, where solves ended early.
+
+    That of control points beside the curve, and ten times the last barrier parameter.
+    """
+    central = solution.central
+    if central is None:
+        return 0.0
+    rows = 0.0 if central.rows is None else central.rows.max_loss - MAX_LOSS
+    return rows + BARRIER_EXCESS * central.level
 
 
 def error_along(solution: Solution, finer: FinerSolution) -> float:

@@ -43,7 +43,7 @@ LEAST_LOSS = 1e-7
 which its part is not halved."""
 MAX_LOSS = 1e-5
 """Rise of the cost by all of them, as a share of the cost, below which none is."""
-LOSS_RATIO = 50.0
+LOSS_RATIO = 20.0
 """The same, relative to the last barrier parameter of the solve, if that is larger."""
 MAX_HALVINGS = 4
 """Number of times that a part is halved at once."""
