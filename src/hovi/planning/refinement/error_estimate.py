@@ -30,6 +30,7 @@ from hovi.planning.refinement.nearby_minimum import nearby_minimum
 from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.central_path import CentralPath
 from hovi.planning.solver.methods.method import Method
+from hovi.planning.solver.receding.last_motion import meets
 from hovi.planning.solver.solver import Solution, solve_on_grid
 from hovi.system.dataclass import dataclass
 
@@ -42,6 +43,8 @@ RICHER_LEVEL = 1e-3
 RICHER_BARRIER = 1e-7
 """Its least last barrier parameter, whose share of the cost is less than errors that can be told.
 """
+SAME_LEVEL = 1.1
+"""Ratio of its last barrier parameter to the one asked for up to which it was solved to the end."""
 MAX_FINER_STEPS = 80
 """Maximum number of steps to a finer solution: one that takes more is not near."""
 
@@ -179,6 +182,7 @@ def followed_within_limits(solution: Solution, known: FinerSolution) -> FinerSol
 def _finished(found: FinerSolution, barrier: float) -> Solution | None:
     """A motion that is no minimum yet, or whose limits were not checked, solved to the end.
 
+    Where it was solved to the end, and meets its limits between the points too, it is that motion.
     barrier: last barrier parameter.
     """
     from hovi.planning.solver.methods.interior_point import InteriorPoint
@@ -186,6 +190,8 @@ def _finished(found: FinerSolution, barrier: float) -> Solution | None:
     known = found.finish()
     if known is None or known.central is None or known.problem is None:
         return None
+    if known.central.level <= SAME_LEVEL * barrier and meets(known.problem, known.trajectory.path):
+        return dataclasses.replace(known, central=known.central.freed())
     method = InteriorPoint(known.central.freed())
     solution = solve_on_grid(
         known.problem, known.trajectory.path, near=True, method=method, barrier=barrier
