@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable
 from functools import partial
 
@@ -16,6 +17,8 @@ from hovi.discrete.trajectory import Trajectory
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.problem.tolerance import Accuracy, Tolerance
 from hovi.planning.refinement.adaptive import refine_to_tolerance
+from hovi.planning.refinement.candidate import Candidate
+from hovi.planning.search import free_to_tolerance as free_to_tolerance_module
 from hovi.planning.search.free_duration import FreeDuration, SolveFor
 from hovi.planning.search.free_to_tolerance import free_to_tolerance
 from hovi.planning.search.planner import plan
@@ -225,3 +228,38 @@ def test_a_duration_that_is_far_from_the_best_is_not_called_the_best(arm_scene: 
         assert found.status is status, found.message
         assert found.success == (status is Status.MINIMUM)
         assert ("longer durations cost less by" in found.message) != found.success
+
+
+@pytest.mark.parametrize("tolerance", [1e-7, 1e-13])
+def test_after_the_last_grid_the_duration_is_the_best_and_the_error_is_that_of_the_motion(
+    task: Task, monkeypatch: pytest.MonkeyPatch, tolerance: float
+) -> None:
+    """Also where the tolerance was not reached."""
+    monkeypatch.setattr(free_to_tolerance_module, "MAX_GRIDS", 1)
+    refined: list[Solution] = []
+
+    def refine(solution: Solution) -> Solution:
+        refined.append(refine_to_tolerance(solution, Tolerance(tolerance)))
+        return refined[-1]
+
+    def on_grid(grid: Grid) -> SolveFor:
+        def solve_for(T: float, guess: Trajectory) -> Solution:
+            ld = DiscreteLagrangian(task.scene.effort_lagrangian(), grid.stretched(T))
+            return solve_on_grid(TrajectoryProblem(ld, task.start, task.goal), guess)
+
+        return solve_for
+
+    ld = DiscreteLagrangian(task.scene.effort_lagrangian(), Grid.uniform(1.0, 6, galerkin(2)))
+    first = solve_on_grid(TrajectoryProblem(ld, task.start, task.goal))
+    found = free_to_tolerance(FreeDuration(*BOUNDS, WEIGHT), on_grid, refine, first)
+    assert len(refined) == 1
+    assert abs(refined[0].duration_derivative + WEIGHT) > 1e-7 * WEIGHT
+    assert found.success, found.message
+    assert abs(found.duration_derivative + WEIGHT) <= 1e-7 * WEIGHT
+    accuracy, T = accuracy_of(found), found.trajectory.duration
+    measured = Candidate.of(
+        dataclasses.replace(found, cost=found.cost - WEIGHT * T), Tolerance(tolerance)
+    )
+    assert accuracy.error == pytest.approx(measured.error, rel=0.1)
+    assert accuracy.reached == measured.within_tolerance
+    assert accuracy.reached == (accuracy.reason == "") != ("stopped early" in found.message)

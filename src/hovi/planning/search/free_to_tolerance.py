@@ -8,9 +8,11 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
+from functools import partial
 
-from hovi.planning.problem.tolerance import Round
-from hovi.planning.refinement.error_estimate import with_estimate
+from hovi.planning.problem.tolerance import Accuracy, Round
+from hovi.planning.refinement.candidate import Candidate
+from hovi.planning.refinement.error_estimate import estimate_against, with_estimate
 from hovi.planning.search.free_duration import BestDuration, FreeDuration
 from hovi.planning.search.joint_duration import (
     NEXT_STRIDE,
@@ -60,34 +62,46 @@ def free_to_tolerance(
         ending = found.ending if refined.success else "The duration is"
         at_jump = found.at_jump and settled  # else the jump is one of another grid
         found = dataclasses.replace(found, solution=refined, ending=ending, at_jump=at_jump)
-        if not refined.accuracy.reached:
-            if refined.success and not settled:
-                last = best_on_its_grid(free, on_grid, refined, NEXT_STRIDE, jointly)
-                steps += last.steps - refined.nit
-                found = _with_accuracy_of(refined, last)
-            break
-        kept = found
-        if settled or number == MAX_GRIDS - 1:
+        kept = found if refined.accuracy.reached else kept
+        if settled or not refined.success:
             break
         found = best_on_its_grid(free, on_grid, refined, NEXT_STRIDE, jointly)
         steps += found.steps - refined.nit
+        if not refined.accuracy.reached or number == MAX_GRIDS - 1:
+            found = _measured(found, refined.accuracy)
+            break
     best = found if kept is None or kept is found else _better(kept, found)
     return _with_rounds(dataclasses.replace(unless_best(best), steps=steps), rounds)
 
 
-def _with_accuracy_of(refined: Solution, last: BestDuration) -> BestDuration:
-    """The motion of a last search, whose duration hardly differs from that of the refined motion.
+def _measured(last: BestDuration, before: Accuracy) -> BestDuration:
+    """The motion of a last search, which is not refined, with its own accuracy.
 
-    It has the accuracy of that one, which did not reach the tolerance.
+    before: of the motion that the search began with.
     """
-    solution = dataclasses.replace(last.solution, accuracy=refined.accuracy)
-    return dataclasses.replace(last, solution=with_estimate(solution, refined.error_estimate))
+    solution = last.solution
+    if not solution.success:
+        return last
+    candidate = Candidate.of(solution, before.tolerance)
+    solution, finer = with_estimate(solution, candidate.error_of_cost), candidate.finer
+    frame = before.tolerance.frame
+    reached = candidate.within_tolerance
+    why = before.reason or f"the best duration changed on each of {MAX_GRIDS} grids"
+    accuracy = dataclasses.replace(
+        before,
+        error=candidate.error,
+        reached=reached,
+        reason="" if reached else why,
+        compare=None if finer is None else partial(estimate_against, solution, finer, frame),
+        along=candidate.along,
+    )
+    return dataclasses.replace(last, solution=dataclasses.replace(solution, accuracy=accuracy))
 
 
 def _better(kept: BestDuration, later: BestDuration) -> BestDuration:
     """A motion within the tolerance, or that of the later round if only that has its best duration.
 
-    The later one failed, or is not within the tolerance.
+    The later one failed, or may not be within the tolerance.
     """
     failed = later.solution
     if failed.success and is_best(later) and not is_best(kept):
