@@ -29,6 +29,7 @@ from hovi.planning.refinement.error_estimate import (
 )
 from hovi.planning.refinement.passive_torque import NEGLIGIBLE_SHARE, passive_torque
 from hovi.planning.refinement.whirling import (
+    fault_of_distance,
     fault_of_whirling,
     whirl,
     whirl_without_minimum,
@@ -117,7 +118,8 @@ def resolved(solution: Solution) -> Solution:
     (c) that solution was found;
     (d) no light joint without limits whirls too fast for the error of the cost; if one whirls
         fast, the finer solution has to be near a minimum on a still finer grid: see
-        `fault_of_whirling`.
+        `fault_of_whirling`. Nor is it further away than a radian, with a still finer one as far
+        again: see `fault_of_distance`.
     Solutions of another status are returned unchanged. If the deadline in force passes before
     all of this is known, the status is TIME_LIMIT.
     """
@@ -148,7 +150,9 @@ def _checked(solution: Solution) -> tuple[Solution, str, FinerSolution | None]:
     elif not reason and not _costs_nothing(solution):
         reason = _fault_of_estimate(solution.error_estimate)
     error = None if _costs_nothing(solution) else solution.error_estimate
-    return solution, reason or fault_of_whirling(solution, error, finer), finer
+    for fault_of in () if reason else (fault_of_whirling, fault_of_distance):
+        reason = reason or fault_of(solution, error, finer)
+    return solution, reason, finer
 
 
 def unresolved_if_whirling(solution: Solution) -> Solution:

@@ -50,6 +50,12 @@ that it was compared with tend to find another motion."""
 MAX_HOPELESS_ERROR = 3e-4
 """The same beyond HOPELESS_RATIO."""
 
+FAR = 1.0
+"""Distance to the finer solution in a coordinate, in [rad] or [m], above which that may be another
+motion along a valley, whose cost says little of the error."""
+CONTRACTION = 0.5
+"""Ratio of the distances to the finer and the finest solution up to which the grids converge."""
+
 
 @dataclass(frozen=True)
 class Whirl:
@@ -152,6 +158,34 @@ def fault_of_whirling(
     )
 
 
+def fault_of_distance(
+    solution: Solution, error: float | None, finer: FinerSolution | None = None
+) -> str:
+    """Why a minimum without limits is not trusted, as the finer one is FAR away; "" if it is.
+
+    It is where a still finer one is nearer, and with an error below MAX_WHIRLING_ERROR in any case.
+    Arguments as of `fault_of_whirling`.
+    """
+    problem = solution.problem
+    assert problem is not None
+    if problem.limited or error is None or error <= MAX_WHIRLING_ERROR:
+        return ""
+    try:
+        finer = finer or finer_than(solution)
+        if finer is None:
+            return ""
+        far = _distance(solution, finer)
+        known = _finished(finer) if far > FAR else None
+        finest = None if known is None else finer_than(known)
+    except HoviError:
+        return ""
+    if far <= FAR:
+        return ""
+    if known is not None and finest is not None and _distance(known, finest) <= CONTRACTION * far:
+        return ""
+    return f"a finer grid moves it by up to {far:.2g}, and a still finer one as far again"
+
+
 def _is_confirmed(solution: Solution, finer: FinerSolution | None, largest: float) -> bool:
     """Whether the finer solution of a minimum has one nearby on a still finer grid.
 
@@ -160,15 +194,27 @@ def _is_confirmed(solution: Solution, finer: FinerSolution | None, largest: floa
     """
     try:
         finer = finer or finer_than(solution)
-        if finer is None:
-            return False
-        known = finer.finish()
-        if known is None:
-            known = solve_on_grid(finer.problem, finer.path, max_iterations=MAX_FINER_STEPS)
-        finest = finer_than(known) if known.success else None
+        known = None if finer is None else _finished(finer)
+        finest = None if known is None else finer_than(known)
     except HoviError:
         return False
     return finest is not None and relative_difference(finest.known, finest.cost) <= largest
+
+
+def _finished(finer: FinerSolution) -> Solution | None:
+    """The finer solution as a minimum; None if it leads to none."""
+    known = finer.finish()
+    if known is None:
+        known = solve_on_grid(finer.problem, finer.path, max_iterations=MAX_FINER_STEPS)
+    return known if known.success else None
+
+
+def _distance(solution: Solution, finer: FinerSolution) -> float:
+    """Largest difference of a coordinate at the nodes; 0 on other nodes."""
+    q, other = solution.trajectory.q, finer.path.q
+    if q.shape != other.shape:
+        return 0.0
+    return float(np.abs(finer.problem.coordinates.difference(q, other)).max())
 
 
 def whirl_without_minimum(solution: Solution) -> Whirl | None:
