@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import re
 
 import numpy as np
@@ -9,8 +10,11 @@ import pinocchio as pin
 import pytest
 
 import hovi
+from hovi.planning.refinement.error_estimate import finer_than
+from hovi.planning.refinement.whirling import MAX_WHIRLING_ERROR, fault_of_whirling, whirl
 from hovi.planning.solver.solver import solve_on_grid
 
+UR5_REACH = [1.46, -2.7, 1.45, 1.55, 2.1, -1.61], [2.5, 2.36, 0.25, -0.95, 2.2, 1.59], 3.89
 XARM_REACH = [0.3, -0.6, 0.5, 0.8, 0.2, 0.4, -0.3], [-0.9, 0.4, -0.8, 1.6, 1.2, 1.3, 1.5], 3.0
 
 
@@ -66,3 +70,69 @@ def test_a_whirling_motion_that_a_finer_grid_leaves_is_no_minimum() -> None:
     assert finer.cost < 0.99 * found.cost
     assert found.status is hovi.Status.UNRESOLVED
     assert "a finer grid may find another motion" in found.message
+
+
+@pytest.fixture(scope="module")
+def whirling_z1() -> hovi.Solution:
+    """Two more modes change its cost by 0.1 %, intervals of a quarter by 1.2 %, 3 rad away."""
+    scene = hovi.Scene(hovi.load_robot("z1", locked=["jointGripper"]), [hovi.effects.Gravity()])
+    start = [0.06222511, 1.94983376, -0.15340647, 1.26122452, 0.59194828, -2.10693647]
+    goal = [2.14330674, 2.11635047, -1.8623539, -0.84617339, 1.11296258, 1.76312911]
+    return hovi.plan(scene, start, goal, 2.47673118403244, limits="none", processes=1)
+
+
+def test_a_later_grid_that_is_left_unfinished_refutes_an_estimate(
+    whirling_z1: hovi.Solution,
+) -> None:
+    found, accuracy = whirling_z1, whirling_z1.accuracy
+    assert found.status is hovi.Status.UNRESOLVED, found.message
+    assert accuracy is not None
+    assert found.problem is not None
+    finer = found.problem.grid.intervals < np.array([done.intervals for done in accuracy.rounds])
+    lower = np.array([done.cost for done in accuracy.rounds])[finer]
+    assert len(lower) > 0
+    assert np.isnan([done.error for done in accuracy.rounds])[finer].all()
+    assert found.error_estimate == pytest.approx(found.cost / lower.min() - 1, rel=1e-3)
+
+
+def test_a_fast_whirling_motion_needs_a_minimum_on_two_finer_grids(
+    whirling_z1: hovi.Solution,
+) -> None:
+    found = dataclasses.replace(whirling_z1, success=True, status=hovi.Status.MINIMUM)
+    finer = finer_than(found)
+    assert finer is not None
+    error = 1 - finer.cost / found.cost
+    assert error < MAX_WHIRLING_ERROR
+    assert "a still finer one finds another motion" in fault_of_whirling(found, error)
+    assert found.problem is not None
+    quarters = found.problem.on(found.problem.grid.halved().halved())
+    assert solve_on_grid(quarters, found.trajectory).cost < 0.99 * found.cost
+
+
+def test_a_fast_whirling_motion_that_finer_grids_confirm_is_a_minimum() -> None:
+    scene = hovi.Scene(hovi.load_robot("ur5"), [hovi.effects.Gravity()])
+    start, goal, duration = UR5_REACH
+    found = hovi.plan(scene, start, goal, duration, limits="none", processes=1)
+    assert found.success, found.message
+    whirling = whirl(found)
+    assert whirling is not None
+    assert whirling.is_doubtful
+    assert fault_of_whirling(found, found.error_estimate) == ""
+
+
+def test_a_motion_that_finer_grids_move_ever_further_is_no_minimum() -> None:
+    """Two more modes change its cost by 0.3 %, intervals of a quarter by 1.8 %, 37 rad away."""
+    scene = hovi.Scene(hovi.load_robot("ur5"), [hovi.effects.Gravity()])
+    start = [-2.07511832, 0.34060844, 0.34505737, 0.72300065, 1.97343618, -2.57173197]
+    goal = [-2.09247888, -0.85894251, -2.42605944, -3.01370346, 2.55865486, 1.94229937]
+    options = {"limits": "none", "processes": 1}
+    found = hovi.plan(scene, start, goal, 4.190286081291065, tolerance=0.02, **options)
+    assert whirl(found) is None
+    assert found.status is hovi.Status.UNRESOLVED, found.message
+    assert "a finer grid moves it by up to" in found.message
+    assert found.problem is not None
+    quarters = found.problem.on(found.problem.grid.halved().halved())
+    finer = solve_on_grid(quarters, found.trajectory)
+    assert finer.success
+    assert finer.cost < 0.99 * found.cost
+    assert hovi.plan(scene, start, goal, 4.190286081291065, **options).success

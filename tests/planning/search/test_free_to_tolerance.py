@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable
 from functools import partial
 
@@ -16,6 +17,8 @@ from hovi.discrete.trajectory import Trajectory
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.problem.tolerance import Accuracy, Tolerance
 from hovi.planning.refinement.adaptive import refine_to_tolerance
+from hovi.planning.refinement.candidate import Candidate
+from hovi.planning.search import free_to_tolerance as free_to_tolerance_module
 from hovi.planning.search.free_duration import FreeDuration, SolveFor
 from hovi.planning.search.free_to_tolerance import free_to_tolerance
 from hovi.planning.search.planner import plan
@@ -119,21 +122,18 @@ def in_vain(solution: Solution) -> Solution:
 
 
 @pytest.mark.parametrize(
-    ("later_steps", "later_refine", "reason"),
+    ("later_steps", "later_refine", "status", "reason"),
     [
-        (0, None, "found on a coarser grid (iteration_limit on the finer one)"),
-        (None, None, "found on a coarser grid (interrupted on the finer one)"),
-        (
-            500,
-            in_vain,
-            "found on a coarser grid (the tolerance was not reached again on the finer one)",
-        ),
+        (0, None, Status.UNRESOLVED, "durations cost less by"),
+        (None, None, Status.INTERRUPTED, "the search for the best duration was interrupted"),
+        (500, in_vain, Status.MINIMUM, "stopped early: the time limit was reached"),
     ],
 )
-def test_a_motion_within_the_tolerance_is_kept_if_a_later_round_fails(
+def test_only_a_motion_whose_duration_is_the_best_on_its_grid_is_a_minimum_if_a_later_round_fails(
     task: Task,
     later_steps: int | None,
     later_refine: Callable[[Solution], Solution] | None,
+    status: Status,
     reason: str,
 ) -> None:
     coarse = Grid.uniform(task.duration, 12, galerkin(2))
@@ -160,11 +160,14 @@ def test_a_motion_within_the_tolerance_is_kept_if_a_later_round_fails(
     first = solve_on_grid(TrajectoryProblem(ld, task.start, task.goal))
     found = free_to_tolerance(FreeDuration(*BOUNDS, WEIGHT), on_grid, each_refine, first)
     assert accuracy_of(refined[0]).reached
-    assert found.success == (later_steps is not None)
-    assert found.status is (Status.MINIMUM if found.success else Status.INTERRUPTED)
-    assert found.trajectory is refined[0].trajectory
-    assert accuracy_of(found).reached
+    assert found.success == (status is Status.MINIMUM)
+    assert found.status is status
     assert reason in found.message
+    slope = abs(found.duration_derivative + WEIGHT)
+    assert found.success == (slope <= 1e-7 * WEIGHT)
+    # the last motion within the tolerance, unless only the later one has its best duration
+    assert found.trajectory is refined[-1 if found.success else 0].trajectory
+    assert accuracy_of(found).reached != found.success
 
 
 def test_limits_hold_in_the_best_duration(arm_scene: Scene) -> None:
@@ -215,9 +218,48 @@ def test_a_duration_that_is_far_from_the_best_is_not_called_the_best(arm_scene: 
         return solution
 
     rate = first.duration_derivative
-    for weight, status in ((0.5 * abs(rate), Status.UNRESOLVED), (abs(rate), Status.MINIMUM)):
-        free = FreeDuration(0.5, 6.0, weight)
+    for share, status in (
+        (0.5, Status.UNRESOLVED),
+        (0.999, Status.UNRESOLVED),
+        (1, Status.MINIMUM),
+    ):
+        free = FreeDuration(0.5, 6.0, share * abs(rate))
         found = free_to_tolerance(free, lambda grid: partial(on_grid, grid), refine, first, kept)
         assert found.status is status, found.message
         assert found.success == (status is Status.MINIMUM)
-        assert ("another duration is far better" in found.message) != found.success
+        assert ("longer durations cost less by" in found.message) != found.success
+
+
+@pytest.mark.parametrize("tolerance", [1e-7, 1e-13])
+def test_after_the_last_grid_the_duration_is_the_best_and_the_error_is_that_of_the_motion(
+    task: Task, monkeypatch: pytest.MonkeyPatch, tolerance: float
+) -> None:
+    """Also where the tolerance was not reached."""
+    monkeypatch.setattr(free_to_tolerance_module, "MAX_GRIDS", 1)
+    refined: list[Solution] = []
+
+    def refine(solution: Solution) -> Solution:
+        refined.append(refine_to_tolerance(solution, Tolerance(tolerance)))
+        return refined[-1]
+
+    def on_grid(grid: Grid) -> SolveFor:
+        def solve_for(T: float, guess: Trajectory) -> Solution:
+            ld = DiscreteLagrangian(task.scene.effort_lagrangian(), grid.stretched(T))
+            return solve_on_grid(TrajectoryProblem(ld, task.start, task.goal), guess)
+
+        return solve_for
+
+    ld = DiscreteLagrangian(task.scene.effort_lagrangian(), Grid.uniform(1.0, 6, galerkin(2)))
+    first = solve_on_grid(TrajectoryProblem(ld, task.start, task.goal))
+    found = free_to_tolerance(FreeDuration(*BOUNDS, WEIGHT), on_grid, refine, first)
+    assert len(refined) == 1
+    assert abs(refined[0].duration_derivative + WEIGHT) > 1e-7 * WEIGHT
+    assert found.success, found.message
+    assert abs(found.duration_derivative + WEIGHT) <= 1e-7 * WEIGHT
+    accuracy, T = accuracy_of(found), found.trajectory.duration
+    measured = Candidate.of(
+        dataclasses.replace(found, cost=found.cost - WEIGHT * T), Tolerance(tolerance)
+    )
+    assert accuracy.error == pytest.approx(measured.error, rel=0.1)
+    assert accuracy.reached == measured.within_tolerance
+    assert accuracy.reached == (accuracy.reason == "") != ("stopped early" in found.message)

@@ -9,8 +9,15 @@ import numpy as np
 import pytest
 
 import hovi
-from hovi.planning.search.free_duration import FreeDuration
-from hovi.planning.search.joint_duration import best_duration_by, joint_minimum
+from hovi.discrete.grid import Grid
+from hovi.planning.search.free_duration import BestDuration, FreeDuration, SolveFor
+from hovi.planning.search.joint_duration import (
+    best_duration_by,
+    best_on_its_grid,
+    is_best,
+    joint_minimum,
+    unless_best,
+)
 from hovi.planning.solver.solver import Solution, solve_on_grid
 from hovi.planning.solver.status import Status
 
@@ -172,3 +179,36 @@ def _record(first: Solution, solved: list[Solution]) -> Any:
         return first
 
     return jointly
+
+
+def test_next_to_a_jump_of_the_cost_the_slope_is_small_without_vanishing() -> None:
+    first = fixed_solution(1.4)
+    rate = first.duration_derivative
+    for share, at_jump, best in ((1e-3, True, True), (1e-3, False, False), (0.1, True, False)):
+        free = FreeDuration(0.5, 4.0, abs(rate) * (1 + share))
+        found = BestDuration(free, first, 1, "The best duration is", at_jump=at_jump)
+        assert is_best(found) == best
+        told = unless_best(found)
+        assert told.solution.success == best
+        assert best or "shorter durations cost less by" in told.with_time().message
+
+
+def test_a_search_that_ends_elsewhere_is_repeated_on_the_grid_of_its_motion() -> None:
+    first, grids = fixed_solution(1.4), []
+
+    def on_grid(grid: Grid) -> SolveFor:
+        grids.append(grid)
+
+        def solve(T: float, guess: hovi.Trajectory) -> Solution:
+            assert first.problem is not None
+            return solve_on_grid(first.problem.on(grid.stretched(T)), guess)
+
+        return solve
+
+    joint = iter([first, None])  # one that ends where it began, then none
+    found = best_on_its_grid(
+        FreeDuration(0.5, 4.0, 20.0), on_grid, first, jointly=lambda _: next(joint)
+    )
+    assert found.solution.success
+    assert len(grids) == 2
+    assert found.solution.duration_derivative == pytest.approx(-20.0, rel=1e-8)

@@ -29,6 +29,7 @@ from hovi.planning.refinement.passive_torque import (
 from hovi.planning.refinement.whirling import Whirl, whirl
 from hovi.planning.solver.limits.limit_rows import MAX_LOSS
 from hovi.planning.solver.solver import Solution
+from hovi.planning.solver.status import Status
 from hovi.schemes import is_galerkin
 from hovi.system.dataclass import dataclass
 
@@ -63,7 +64,8 @@ class Candidate:
         error inferred from the Hamiltonian.
     contradicted: relative difference from the cost on the next grid if it is far larger than the
         estimates, else 0.
-    later: relative difference from the most accurate cost of a later grid.
+    later: relative difference from the most accurate cost of a later grid, or from a lower one of
+        an unfinished solve there.
     """
 
     solution: Solution
@@ -172,11 +174,18 @@ class Candidate:
         return dataclasses.replace(self, error=error, contradicted=difference)
 
     def compared_with(self, later_one: Candidate) -> Candidate:
-        """This candidate with an error that a later grid's most accurate cost does not refute."""
-        if not later_one.solution.success:
-            return self
+        """This candidate with an error that a later grid's most accurate cost does not refute.
+
+        An unfinished solve without limits refutes it, too, where the motion it came to costs less:
+        the minimum that it goes to costs less still.
+        """
         finer = later_one.finer
-        cost = later_one.solution.cost if finer is None else finer.cost
+        if later_one.solution.success:
+            cost = later_one.solution.cost if finer is None else finer.cost
+        else:
+            cost = _cost_of_unfinished(later_one.solution)
+            if not cost < self.solution.cost:
+                return self
         later = relative_difference(self.solution.cost, cost)
         in_cost = self.tolerance.quantity is Quantity.COST
         error = max(self.error, later) if in_cost else self.error
@@ -187,6 +196,20 @@ class Candidate:
         if self.solution.success != other.solution.success:
             return self.solution.success
         return bool(np.isnan(other.error) or self.larger_error < other.larger_error)
+
+
+def _cost_of_unfinished(solution: Solution) -> float:
+    """The cost of a motion that is no minimum yet, along its own curve if that is more.
+
+    inf for one that need not meet the limits or equations.
+    """
+    problem, status = solution.problem, solution.status
+    if problem is None or status not in (Status.ITERATION_LIMIT, Status.TIME_LIMIT):
+        return np.inf
+    if problem.limited or problem.constrained or not np.isfinite(solution.cost):
+        return np.inf
+    along = integral_along(problem.ld.lagrangian, solution.trajectory).value
+    return float(max(solution.cost, along))
 
 
 def _errors_of_cost(

@@ -28,7 +28,12 @@ from hovi.planning.refinement.error_estimate import (
     with_metadata,
 )
 from hovi.planning.refinement.passive_torque import NEGLIGIBLE_SHARE, passive_torque
-from hovi.planning.refinement.whirling import whirl, whirl_without_minimum
+from hovi.planning.refinement.whirling import (
+    fault_of_distance,
+    fault_of_whirling,
+    whirl,
+    whirl_without_minimum,
+)
 from hovi.planning.solver.methods.method import Method, Report
 from hovi.planning.solver.methods.stationary import Stationary
 from hovi.planning.solver.receding.shift import Shift
@@ -111,8 +116,10 @@ def resolved(solution: Solution) -> Solution:
         most 1 %. The finer grid has two more modes per interval, of a Galerkin table for any
         scheme; under limits every interval is halved instead;
     (c) that solution was found;
-    (d) no light joint without limits whirls too fast for the error of the cost: see
-        `Whirl.is_trusted`.
+    (d) no light joint without limits whirls too fast for the error of the cost; if one whirls
+        fast, the finer solution has to be near a minimum on a still finer grid: see
+        `fault_of_whirling`. Nor is it further away than a radian, with a still finer one as far
+        again: see `fault_of_distance`.
     Solutions of another status are returned unchanged. If the deadline in force passes before
     all of this is known, the status is TIME_LIMIT.
     """
@@ -142,7 +149,10 @@ def _checked(solution: Solution) -> tuple[Solution, str, FinerSolution | None]:
         solution, reason, finer = _compared_with_finer(solution)
     elif not reason and not _costs_nothing(solution):
         reason = _fault_of_estimate(solution.error_estimate)
-    return solution, reason or _fault_of_whirling(solution), finer
+    error = None if _costs_nothing(solution) else solution.error_estimate
+    for fault_of in () if reason else (fault_of_whirling, fault_of_distance):
+        reason = reason or fault_of(solution, error, finer)
+    return solution, reason, finer
 
 
 def unresolved_if_whirling(solution: Solution) -> Solution:
@@ -326,19 +336,6 @@ def _compared_with_stationary(solution: Solution) -> tuple[Solution, str]:
     change = relative_difference(solution.cost, finer.cost)
     compared = with_estimate(solution, max(change, ROUNDING_FLOOR))
     return compared, "" if change <= RESOLVED else _cost_change(change)
-
-
-def _fault_of_whirling(solution: Solution) -> str:
-    """Why (d) does not hold; "" if it does."""
-    assert solution.problem is not None
-    whirling = None if solution.problem.limited else whirl(solution)
-    if whirling is None:
-        return ""
-    error = None if _costs_nothing(solution) else solution.error_estimate
-    if whirling.is_trusted(error):
-        return ""
-    known = "" if error is None else f", with an error of {100 * error:.2g} % of the cost,"
-    return f"at {whirling.speed:.3g} rad/s{known} a finer grid may find another motion"
 
 
 def _fault_of_estimate(estimate: float | None) -> str:

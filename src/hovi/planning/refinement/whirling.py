@@ -10,8 +10,15 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from hovi.discrete.measures.motion_error import relative_difference
+from hovi.errors import HoviError
 from hovi.planning.problem.problem import TrajectoryProblem
-from hovi.planning.solver.solver import Solution
+from hovi.planning.refinement.error_estimate import (
+    MAX_FINER_STEPS,
+    FinerSolution,
+    finer_than,
+)
+from hovi.planning.solver.solver import Solution, solve_on_grid
 from hovi.planning.solver.status import Status
 from hovi.robot.mass_matrix import MassMatrix
 from hovi.system.dataclass import dataclass
@@ -33,7 +40,8 @@ MAX_WORK = 20_000
 HOPELESS_RATIO = 40.0
 """The same ratio above which finer grids are not tried for a motion that is not resolved."""
 DOUBTFUL_RATIO = 20.0
-"""The same ratio above which a grid is trusted only with an error below MAX_WHIRLING_ERROR."""
+"""The same ratio above which a grid is trusted only with an error below MAX_WHIRLING_ERROR, and if
+the finer solution is near a minimum on a still finer grid, too."""
 UNUSABLE_RATIO = 60.0
 """The same ratio above which no grid is trusted: a minimum on one grid is none on a finer one."""
 MAX_WHIRLING_ERROR = 1e-3
@@ -41,6 +49,12 @@ MAX_WHIRLING_ERROR = 1e-3
 that it was compared with tend to find another motion."""
 MAX_HOPELESS_ERROR = 3e-4
 """The same beyond HOPELESS_RATIO."""
+
+FAR = 1.0
+"""Distance to the finer solution in a coordinate, in [rad] or [m], above which that may be another
+motion along a valley, whose cost says little of the error."""
+CONTRACTION = 0.5
+"""Ratio of the distances to the finer and the finest solution up to which the grids converge."""
 
 
 @dataclass(frozen=True)
@@ -70,9 +84,17 @@ class Whirl:
         """Whether a grid resolves it. error: of the cost, relative; None for a cost of rounding."""
         if self.ratio > UNUSABLE_RATIO:
             return False
-        if error is None or self.ratio <= DOUBTFUL_RATIO:
-            return True
-        return error <= (MAX_WHIRLING_ERROR if self.ratio <= HOPELESS_RATIO else MAX_HOPELESS_ERROR)
+        return error is None or not self.is_doubtful or error <= self.largest_error
+
+    @property
+    def is_doubtful(self) -> bool:
+        """Whether it is so fast that a motion on one finer grid does not confirm a minimum."""
+        return self.ratio > DOUBTFUL_RATIO
+
+    @property
+    def largest_error(self) -> float:
+        """Largest relative error of the cost with which a doubtful motion is trusted."""
+        return MAX_WHIRLING_ERROR if self.ratio <= HOPELESS_RATIO else MAX_HOPELESS_ERROR
 
     def __str__(self) -> str:
         """What it does, and what helps."""
@@ -109,6 +131,90 @@ def whirl(solution: Solution) -> Whirl | None:
         return None
     name, speed = trajectory.coordinate_names[worst], float(v[:, worst].max())
     return Whirl(name, speed, float(ratio[worst]), inertia)
+
+
+def fault_of_whirling(
+    solution: Solution, error: float | None, finer: FinerSolution | None = None
+) -> str:
+    """Why a minimum is not trusted, as a joint whirls in it; "" if it is, and if none does.
+
+    error: of the cost, relative; None for a cost of rounding. finer: what it was compared with, if
+        that is known.
+    """
+    assert solution.problem is not None
+    whirling = None if solution.problem.limited else whirl(solution)
+    if whirling is None:
+        return ""
+    if not whirling.is_trusted(error):
+        known = "" if error is None else f", with an error of {100 * error:.2g} % of the cost,"
+        return f"at {whirling.speed:.3g} rad/s{known} a finer grid may find another motion"
+    if error is None or not whirling.is_doubtful:
+        return ""
+    if _is_confirmed(solution, finer, whirling.largest_error):
+        return ""
+    return (
+        f"at {whirling.speed:.3g} rad/s a finer grid confirms it, but a still finer one finds "
+        "another motion"
+    )
+
+
+def fault_of_distance(
+    solution: Solution, error: float | None, finer: FinerSolution | None = None
+) -> str:
+    """Why a minimum without limits is not trusted, as the finer one is FAR away; "" if it is.
+
+    It is where a still finer one is nearer, and with an error below MAX_WHIRLING_ERROR in any case.
+    Arguments as of `fault_of_whirling`.
+    """
+    problem = solution.problem
+    assert problem is not None
+    if problem.limited or error is None or error <= MAX_WHIRLING_ERROR:
+        return ""
+    try:
+        finer = finer or finer_than(solution)
+        if finer is None:
+            return ""
+        far = _distance(solution, finer)
+        known = _finished(finer) if far > FAR else None
+        finest = None if known is None else finer_than(known)
+    except HoviError:
+        return ""
+    if far <= FAR:
+        return ""
+    if known is not None and finest is not None and _distance(known, finest) <= CONTRACTION * far:
+        return ""
+    return f"a finer grid moves it by up to {far:.2g}, and a still finer one as far again"
+
+
+def _is_confirmed(solution: Solution, finer: FinerSolution | None, largest: float) -> bool:
+    """Whether the finer solution of a minimum has one nearby on a still finer grid.
+
+    A valley along which a joint whirls may have a minimum on one grid and on the next, but none on
+    finer ones. largest: relative difference of the costs on the two finer grids.
+    """
+    try:
+        finer = finer or finer_than(solution)
+        known = None if finer is None else _finished(finer)
+        finest = None if known is None else finer_than(known)
+    except HoviError:
+        return False
+    return finest is not None and relative_difference(finest.known, finest.cost) <= largest
+
+
+def _finished(finer: FinerSolution) -> Solution | None:
+    """The finer solution as a minimum; None if it leads to none."""
+    known = finer.finish()
+    if known is None:
+        known = solve_on_grid(finer.problem, finer.path, max_iterations=MAX_FINER_STEPS)
+    return known if known.success else None
+
+
+def _distance(solution: Solution, finer: FinerSolution) -> float:
+    """Largest difference of a coordinate at the nodes; 0 on other nodes."""
+    q, other = solution.trajectory.q, finer.path.q
+    if q.shape != other.shape:
+        return 0.0
+    return float(np.abs(finer.problem.coordinates.difference(q, other)).max())
 
 
 def whirl_without_minimum(solution: Solution) -> Whirl | None:

@@ -95,6 +95,8 @@ class BestDuration:
 
     steps: of the optimiser, in all solves. ending: words of the message before the duration.
     reason: why the search ended early; "" if it did not, or if the motion is not a minimum.
+    at_edge: whether durations next to it, at which less cost is expected, are infeasible.
+    at_jump: whether J' + w changes its sign next to it, where the cost jumps on this grid.
     """
 
     free: FreeDuration
@@ -102,6 +104,8 @@ class BestDuration:
     steps: int
     ending: str
     reason: str = ""
+    at_edge: bool = False
+    at_jump: bool = False
 
     def with_time(self) -> Solution:
         """The motion as a solution whose cost includes w T."""
@@ -140,7 +144,8 @@ def best_duration(
     first: a solution for some duration between them, which is followed to other durations.
     stride: ratio of the first two durations; it is squared in each step, up to MAX_STRIDE.
     A success is a minimum for its duration, and J' + w vanishes there, or the duration is a bound,
-    or, to EDGE_PRECISION, durations beyond it are infeasible or cost more; the message says which.
+    or, to EDGE_PRECISION, durations beyond it are infeasible or cost more, or the cost jumps there
+    as intervals are split; the message says which.
     A first solution that is not a minimum is returned unchanged.
     """
     return _Search(free, solve, first, stride).run()
@@ -219,7 +224,7 @@ class _Search:
         self.durations = 0
         T = float(np.clip(first.trajectory.duration, free.lower, free.upper))
         self.beyond: _Trial | None = None
-        self.ending = ""
+        self.ending, self.at_jump = "", False
         self._move_to(_Trial(T, first, free.weight, T))
 
     def run(self) -> BestDuration:
@@ -240,7 +245,8 @@ class _Search:
         return self._best()
 
     def _best(self) -> BestDuration:
-        return BestDuration(self.free, self.here.solution, self.steps, self.ending)
+        found, jump = self.here.solution, self.at_jump
+        return BestDuration(self.free, found, self.steps, self.ending, at_jump=jump)
 
     def _next_duration(self) -> float | None:
         """The next duration in [s]; None at a bound or at the edge of feasibility."""
@@ -323,7 +329,7 @@ class _Search:
         self.here, costlier = _sides(known, root)
         jump = (costlier.total - self.here.total) / abs(self.here.total)
         if jump <= MAX_GRID_JUMP:
-            self.here = min(known.values(), key=lambda each: each.total)
+            self.here, self.at_jump = min(known.values(), key=lambda each: each.total), True
             self.ending = f"The best duration, next to a jump of the cost by {jump:.0e} of it, is"
         else:
             self.beyond = costlier
@@ -356,7 +362,7 @@ class _Search:
             return dataclasses.replace(best, ending=f"{edge} before motions cost more, is")
         status = beyond.solution.status
         if status is Status.INFEASIBLE:
-            return dataclasses.replace(best, ending=f"{edge} found feasible, is")
+            return dataclasses.replace(best, ending=f"{edge} found feasible, is", at_edge=True)
         at = f"{beyond.duration:.6g} s, where less cost is expected"
         return best.unfinished(status, f"for {at}, the solve ended in {status}")
 

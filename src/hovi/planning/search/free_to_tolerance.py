@@ -8,31 +8,28 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
+from functools import partial
 
-from hovi.discrete.grid import Grid
-from hovi.planning.problem.tolerance import Round
-from hovi.planning.search.free_duration import (
-    DURATION_PRECISION,
-    BestDuration,
-    FreeDuration,
-    SolveFor,
+from hovi.planning.problem.tolerance import Accuracy, Round
+from hovi.planning.refinement.candidate import Candidate
+from hovi.planning.refinement.error_estimate import estimate_against, with_estimate
+from hovi.planning.search.free_duration import BestDuration, FreeDuration
+from hovi.planning.search.joint_duration import (
+    NEXT_STRIDE,
+    JointSolve,
+    OnGrid,
+    best_on_its_grid,
+    is_best,
+    unless_best,
 )
-from hovi.planning.search.joint_duration import JointSolve, best_duration_by
 from hovi.planning.solver.solver import Solution
 from hovi.planning.solver.status import Status
 
-OnGrid = Callable[[Grid], SolveFor]
-"""Returns a solver on a grid, scaled to each duration."""
 Refine = Callable[[Solution], Solution]
 """Refines a motion of fixed duration to the tolerance; keeps its grid if that is fine enough."""
 
 MAX_GRIDS = 4
 """Maximum number of grids on which the best duration is computed."""
-FINER_GRID_STRIDE = 1.001
-"""Ratio of the first two durations on a finer grid."""
-
-LARGEST_SLOPE = 0.1
-"""Slope J' + w, relative to J' or w, of a duration that is nearly the best."""
 
 
 def free_to_tolerance(
@@ -48,10 +45,10 @@ def free_to_tolerance(
     jointly: solves for the duration, too; none if None.
     The accuracy is that of the motion for its fixed duration, relative to the cost without w T.
     Where J' + w vanishes, an error of the duration changes the cost to second order only.
-    If a later round fails, the motion within the tolerance of the round before is returned; after
-    an interrupt it counts as no success.
+    If a later round fails, the motion within the tolerance of the round before is returned, as a
+    success only if its duration `is_best`; after an interrupt it counts as none.
     """
-    found = best_duration_by(free, on_grid(first.trajectory.grid), first, jointly=jointly)
+    found = best_on_its_grid(free, on_grid, first, jointly=jointly)
     steps, rounds = found.steps, tuple[Round, ...]()
     kept: BestDuration | None = None
     for number in range(MAX_GRIDS):
@@ -63,35 +60,60 @@ def free_to_tolerance(
         steps += sum(done.nit for done in refined.accuracy.rounds[1:])
         settled = refined.trajectory.grid is found.solution.trajectory.grid
         ending = found.ending if refined.success else "The duration is"
-        found = dataclasses.replace(found, solution=refined, ending=ending)
-        if not refined.accuracy.reached:
+        at_jump = found.at_jump and settled  # else the jump is one of another grid
+        found = dataclasses.replace(found, solution=refined, ending=ending, at_jump=at_jump)
+        kept = found if refined.accuracy.reached else kept
+        if settled or not refined.success:
             break
-        kept = found
-        if settled or number == MAX_GRIDS - 1:
-            break
-        solve = on_grid(refined.trajectory.grid)
-        found = best_duration_by(free, solve, refined, FINER_GRID_STRIDE, jointly)
+        found = best_on_its_grid(free, on_grid, refined, NEXT_STRIDE, jointly)
         steps += found.steps - refined.nit
-    best = found if kept is None or kept is found else _with_failure(kept, found.solution)
-    if best.solution.success and not _is_best(best):
-        reason = "on the last grid another duration is far better than that of the grid before"
-        best = best.unfinished(Status.UNRESOLVED, reason)
-    return _with_rounds(dataclasses.replace(best, steps=steps), rounds)
+        if not refined.accuracy.reached or number == MAX_GRIDS - 1:
+            found = _measured(found, refined.accuracy)
+            break
+    best = found if kept is None or kept is found else _better(kept, found)
+    return _with_rounds(dataclasses.replace(unless_best(best), steps=steps), rounds)
 
 
-def _is_best(found: BestDuration) -> bool:
-    """Whether J' + w nearly vanishes, or pushes against the bound at which the duration is."""
-    free, solution = found.free, found.solution
-    T, rate = solution.trajectory.duration, solution.duration_derivative
-    slope = rate + free.weight
-    bound = free.lower if slope > 0 else free.upper
-    small = abs(slope) <= LARGEST_SLOPE * max(abs(rate), free.weight)
-    return bool(small or abs(T / bound - 1) <= DURATION_PRECISION)
+def _measured(last: BestDuration, before: Accuracy) -> BestDuration:
+    """The motion of a last search, which is not refined, with its own accuracy.
+
+    before: of the motion that the search began with.
+    """
+    solution = last.solution
+    if not solution.success:
+        return last
+    candidate = Candidate.of(solution, before.tolerance)
+    solution, finer = with_estimate(solution, candidate.error_of_cost), candidate.finer
+    frame = before.tolerance.frame
+    reached = candidate.within_tolerance
+    why = before.reason or f"the best duration changed on each of {MAX_GRIDS} grids"
+    accuracy = dataclasses.replace(
+        before,
+        error=candidate.error,
+        reached=reached,
+        reason="" if reached else why,
+        compare=None if finer is None else partial(estimate_against, solution, finer, frame),
+        along=candidate.along,
+    )
+    return dataclasses.replace(last, solution=dataclasses.replace(solution, accuracy=accuracy))
+
+
+def _better(kept: BestDuration, later: BestDuration) -> BestDuration:
+    """A motion within the tolerance, or that of the later round if only that has its best duration.
+
+    The later one failed, or may not be within the tolerance.
+    """
+    failed = later.solution
+    if failed.success and is_best(later) and not is_best(kept):
+        return later
+    return _with_failure(unless_best(kept, failed.status), failed)
 
 
 def _with_failure(kept: BestDuration, failed: Solution) -> BestDuration:
     """The last motion within the tolerance, with the reason why the next round failed."""
     reason = str(failed.status) if not failed.success else "the tolerance was not reached again"
+    if not kept.solution.success:
+        return kept
     if failed.status is Status.INTERRUPTED:  # so that the search ends
         kept = kept.unfinished(failed.status, "the search for the best duration was interrupted")
     ending = f"The best duration, found on a coarser grid ({reason} on the finer one), is"

@@ -1,10 +1,14 @@
-"""The best duration by one solve for the motion and the duration, where a problem supports that."""
+"""The best duration by one solve for the motion and the duration, where a problem supports that.
+
+And whether it is the best one: only then is the motion a minimum.
+"""
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable
 
-from hovi.discrete.grid import DiscretePath
+from hovi.discrete.grid import DiscretePath, Grid
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.problem.tolerance import LAST_BARRIER
 from hovi.planning.search.continuation import STOPPED
@@ -20,12 +24,25 @@ from hovi.planning.search.free_duration import (
 from hovi.planning.solver.free_duration.joint_solve import solve_jointly, solves_jointly
 from hovi.planning.solver.free_duration.timed_path import TimePrice
 from hovi.planning.solver.solver import Solution
+from hovi.planning.solver.status import Status
 
+OnGrid = Callable[[Grid], SolveFor]
+"""Returns a solver on a grid, scaled to each duration."""
 JointSolve = Callable[[Solution], Solution | None]
 """Solves for the duration, too, from a motion; None for a problem that does not support it."""
 
 STATIONARY_SLOPE = 1e-9
 """Slope J' + w of a minimum whose duration is the best, relative to (J + w T) / T."""
+LARGEST_SLOPE = 1e-7
+"""Largest slope J' + w, relative to w, of a motion that is called a minimum, unless its duration is
+at a bound, at the edge of feasibility or next to a jump of the cost."""
+LARGEST_SLOPE_AT_JUMP = 1e-2
+"""The same next to a jump of the cost, as limits and obstacles cause that act at other instants for
+other durations; the best duration is known to JUMP_BRACKET there."""
+NEXT_STRIDE = 1.001
+"""Ratio of the first two durations of a search that begins near the best one."""
+MAX_SEARCHES = 3
+"""Maximum number of searches, each on the grid of the motion of the one before."""
 _BEST = "The best duration is"
 
 
@@ -80,6 +97,52 @@ def best_duration_by(
         return best_duration(free, solve, first, stride)
     best = BestDuration(free, found, first.nit + found.nit, _ending(free, found) or _BEST)
     return best if found.success else best.unfinished(found.status, ended_search(found.status))
+
+
+def best_on_its_grid(
+    free: FreeDuration,
+    on_grid: OnGrid,
+    first: Solution,
+    stride: float = MAX_STRIDE,
+    jointly: JointSolve | None = None,
+) -> BestDuration:
+    """As best_duration_by, but a success `is_best`, and UNRESOLVED if no such duration is found.
+
+    A search that ends elsewhere is repeated from its motion, on the grid of that.
+    """
+    found = best_duration_by(free, on_grid(first.trajectory.grid), first, stride, jointly)
+    for _ in range(MAX_SEARCHES - 1):
+        if not found.solution.success or is_best(found):
+            return found
+        solve = on_grid(found.solution.trajectory.grid)
+        again = best_duration_by(free, solve, found.solution, NEXT_STRIDE, jointly)
+        steps = found.steps + again.steps - found.solution.nit
+        if not again.solution.success:
+            found = unless_best(found, again.solution.status)
+            return dataclasses.replace(found, steps=steps)
+        found = dataclasses.replace(again, steps=steps)
+    return unless_best(found)
+
+
+def is_best(found: BestDuration) -> bool:
+    """Whether J' + w vanishes, or pushes against a bound, the edge of feasibility or a jump."""
+    free = found.free
+    slope = found.solution.duration_derivative + free.weight
+    largest = LARGEST_SLOPE_AT_JUMP if found.at_jump else LARGEST_SLOPE
+    small = abs(slope) <= largest * free.weight
+    return small or found.at_edge or _ending(free, found.solution) != ""
+
+
+def unless_best(found: BestDuration, status: Status = Status.UNRESOLVED) -> BestDuration:
+    """The motion, without success unless its duration `is_best`. status: of the last search."""
+    if not found.solution.success or is_best(found):
+        return found
+    slope = found.solution.duration_derivative + found.free.weight
+    better = "shorter" if slope > 0 else "longer"
+    why = f" ({ended_search(status)})" if status in STOPPED else ""
+    reason = f"{better} durations cost less by {abs(slope):.2g} per second{why}"
+    status = status if status in STOPPED else Status.UNRESOLVED
+    return found.unfinished(status, reason)
 
 
 def _ending(free: FreeDuration, solution: Solution) -> str:
