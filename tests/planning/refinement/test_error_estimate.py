@@ -15,10 +15,11 @@ from hovi.discrete.measures.motion_error import (
     relative_difference,
 )
 from hovi.discrete.state import State
-from hovi.effects import Gravity
+from hovi.effects import EffortWeight, Gravity
 from hovi.errors import InputError
 from hovi.planning.problem.limits import Limits
 from hovi.planning.problem.problem import MORE_MODES, TrajectoryProblem
+from hovi.planning.refinement.candidate import contributions
 from hovi.planning.refinement.error_estimate import estimate_error, finer_than
 from hovi.planning.solver.solver import Solution, solve_on_grid
 from hovi.robot.loading import load_robot
@@ -157,6 +158,26 @@ def test_the_contributions_of_the_intervals_add_up_to_the_error_of_the_cost(
     finer = finer_than(solution)
     assert finer is not None
     assert np.sum(finer.gains) == pytest.approx(solution.cost - reach_reference.cost, rel=0.05)
+
+
+@pytest.mark.parametrize("weight", [1e-6, 1e6])
+def test_contributions_within_limits_have_the_unit_of_the_cost(
+    arm_scene: Scene, weight: float
+) -> None:
+    lower = np.array([[-9.0, -9], [-4, -4], [-np.inf, -np.inf], [-np.inf, -np.inf]])
+
+    def shares(R: float) -> np.ndarray:
+        ld = DiscreteLagrangian(
+            arm_scene.effort_lagrangian([R, R]), Grid.uniform(1.0, 12, galerkin(2))
+        )
+        limits = Limits(lower, -lower)
+        finer = finer_than(
+            solve_on_grid(TrajectoryProblem(ld, State(HANG), State(REACH_Q), limits))
+        )
+        assert finer is not None
+        return contributions(finer)
+
+    assert shares(weight) == pytest.approx(shares(1.0), rel=0.05, abs=1e-8)
 
 
 def test_an_exact_cubic_has_no_error(arm_scene: Scene) -> None:

@@ -240,22 +240,42 @@ def _solved(
 ) -> FinerSolution | None:
     """The finer solution by a full solve, which may split intervals for limits.
 
-    Its gains are half the integral of the squared difference of the torques.
+    Its gains are the cost of the difference of the torques: see `_cost_of_difference`.
     """
     solution = solve_on_grid(
         fine, start, time_limit=time_limit, near=True, method=method, barrier=barrier
     )
     if not solution.success or solution.problem is None:
         return None
-    coarse, finer = problem.trajectory(path), solution.trajectory
-    k, s = sample_points(coarse)
-    t = np.clip(times_of(coarse, k, s), 0.0, finer.duration)
-    squares = np.sum((coarse.sample_intervals(k, s).tau - finer.sample(t).tau) ** 2, axis=1)
-    gains = 0.5 * coarse.grid.steps * squares.reshape(coarse.grid.intervals, -1).mean(axis=1)
+    finer = solution.trajectory
     known, cost = problem.ld.action(path), solution.cost
+    gains = _cost_of_difference(problem, path, finer, abs(known - cost))
     return FinerSolution(
         solution.problem, finer.path, cost, known, gains, lambda: solution, solution.central
     )
+
+
+def _cost_of_difference(
+    problem: TrajectoryProblem, path: DiscretePath, finer: Trajectory, difference: float
+) -> Array:
+    """1/2 int dtau^T R dtau over each interval, shape (N,), with dtau the difference of torques.
+
+    Where no torque has a weight, shares of the difference of the costs like those with R = 1.
+    """
+    ld, coarse = problem.ld, problem.trajectory(path)
+    N = coarse.grid.intervals
+    k, s = sample_points(coarse)
+    t = np.clip(times_of(coarse, k, s), 0.0, finer.duration)
+    squares = (coarse.sample_intervals(k, s).tau - finer.sample(t).tau) ** 2
+    parts = squares.reshape(N, len(squares) // N, -1).mean(axis=1)
+    by_joint, weights = 0.5 * coarse.grid.steps[:, None] * parts, np.zeros_like(parts)
+    for batch, lagrangian in zip(ld.interval_batches, ld.lagrangians, strict=False):
+        R = lagrangian.output_weight[: parts.shape[1]]  # of torques, before those of their rates
+        weights[batch.numbers, : len(R)] = R
+    if weights.any():
+        return np.asarray(np.vecdot(by_joint, weights))
+    gains = by_joint.sum(axis=1)
+    return np.asarray(gains * (difference / max(float(gains.sum()), np.finfo(float).tiny)))
 
 
 def prolonged(path: DiscretePath, fine: Grid) -> DiscretePath:
