@@ -15,7 +15,7 @@ from hovi.discrete.measures.motion_error import (
     relative_difference,
 )
 from hovi.discrete.state import State
-from hovi.effects import EffortWeight, Gravity
+from hovi.effects import Gravity
 from hovi.errors import InputError
 from hovi.planning.problem.limits import Limits
 from hovi.planning.problem.problem import MORE_MODES, TrajectoryProblem
