@@ -10,7 +10,14 @@ import hovi
 from hovi.discrete.grid import Grid
 from hovi.planning.obstacles.obstacle import Obstacle
 from hovi.planning.paths.free_space import FreeSpace
-from hovi.planning.paths.path_guess import depth_of, motion_along, natural_slopes, on_spline
+from hovi.planning.paths.path_guess import (
+    DRAWS,
+    depth_of,
+    fast_path,
+    motion_along,
+    natural_slopes,
+    on_spline,
+)
 from hovi.planning.problem.limits import as_limits
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.robot.robot import Robot
@@ -119,3 +126,41 @@ def test_problems_for_which_paths_say_too_little_have_no_space(two_link: Robot, 
         problem = problem_of(two_link, *([moving] if kind == "moving" else []))
     assert FreeSpace.of(problem, np.zeros(2)) is None
     assert depth_of(problem, problem.guess("cubic")) == -np.inf
+
+
+class Paths:
+    """Answers with given paths, and counts how many it was asked for."""
+
+    def __init__(self, *paths: np.ndarray) -> None:
+        self.paths, self.asked = paths, list[int]()
+
+    def path(self, space: object, start: np.ndarray, goal: np.ndarray, seed: int) -> np.ndarray:
+        self.asked.append(seed)
+        return self.paths[len(self.asked) - 1]
+
+
+LONG, LESS, SHORT = (np.array([[0.0, 0.0], [x, x], [0.5, 0.0]]) for x in (2.0, 1.0, 0.5))
+"""Paths that take 4, 2 and 1 s at the largest velocities."""
+STRAIGHT_ON = np.array([[0.0, 0.0], [0.25, 0.25], [0.5, 0.0]])
+"""A path that takes no longer than the straight one."""
+
+
+@pytest.mark.parametrize(
+    ("paths", "duration", "taken", "asked"),
+    [
+        ((LESS, LONG, SHORT, LONG), 4.0, LESS, 1),  # fits
+        ((LONG, LESS, SHORT, LONG), 4.0, LESS, 2),
+        ((LONG, LESS, LONG, LONG, SHORT), 0.1, LESS, 4),  # the shortest of four
+        ((LESS, 0.9 * LESS, LONG, LONG), 0.1, LESS, 4),  # not much shorter
+        ((LONG, STRAIGHT_ON, LESS, LONG), 0.1, STRAIGHT_ON, 2),  # none is shorter
+    ],
+)
+def test_the_first_path_is_taken_that_is_fast_enough(
+    two_link: Robot, paths: tuple[np.ndarray, ...], duration: float, taken: np.ndarray, asked: int
+) -> None:
+    source, ends = Paths(*paths), (np.zeros(2), np.array([0.5, 0.0]))
+    space = FreeSpace.of(problem_of(two_link, ball()), np.zeros(2))
+    assert space is not None
+    found = fast_path(source, space, ends, range(3, 23, 5)[:DRAWS], duration)  # type: ignore[arg-type]
+    np.testing.assert_array_equal(found, taken)
+    assert source.asked == [3, 8, 13, 18][:asked]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
 
 import numpy as np
@@ -26,6 +26,16 @@ LOOKED_AT = 129
 """Number of times at which the depth of a guess is looked at."""
 LEAST_LENGTH = 1e-9
 """Length below which two points of a path count as one, as a time at full speed, in [s]."""
+
+DRAWS = 4
+"""Number of paths of which one is taken, unless an earlier one is short enough."""
+PEAK = 1.875
+"""Largest velocity of the motion of least jerk, relative to its mean."""
+STRAIGHT = 1.1
+"""Length of a path, relative to the straight one, up to which it is short enough anyway."""
+
+SHORTER = 0.8
+"""Length of a path, relative to that of an earlier one, up to which it takes its place."""
 
 
 def depth_of(problem: TrajectoryProblem, guess: DiscretePath) -> float:
@@ -54,14 +64,45 @@ def path_guesses(
     with OmplProcess() as ompl:
         for k in range(count):
             legs, x = list[Array](), np.zeros(len(space.speed))
-            for _, q in stops:
+            for (_, q), duration in zip(stops, np.diff(t), strict=True):
                 y = x + space.x_between(space.q(x[None])[0], q)
-                points = ompl.path(space, x, y, seed * 1_009 + k)
+                seeds = range(seed * 1_009 + k, (seed + 1) * 1_009, count)
+                points = fast_path(ompl, space, (x, y), seeds[:DRAWS], float(duration))
                 if points is None:
                     return
                 legs, x = [*legs, points], y
             pieces = [motion_along(space, *leg) for leg in zip(legs, np.diff(t), strict=True)]
             yield problem.path(joined(pieces, t[:-1]))
+
+
+def fast_path(
+    ompl: OmplProcess,
+    space: FreeSpace,
+    ends: tuple[Array, Array],
+    seeds: Iterable[int],
+    duration: float,
+) -> Array | None:
+    """The first path that fits into a duration at the largest velocities, or the shortest one.
+
+    Paths of RRT-Connect differ in length by a factor of two and more; a motion along one that is
+    too long is far outside the limits on velocities. A later path is taken where it is much
+    shorter. None if there is none.
+    """
+    best, direct = None, _time_along(np.stack(ends))
+    for seed in seeds:
+        points = ompl.path(space, *ends, seed)
+        if points is None:
+            break
+        if best is None or _time_along(points) < SHORTER * _time_along(best):
+            best = points
+        if PEAK * _time_along(best) <= duration or _time_along(best) <= STRAIGHT * direct:
+            break
+    return best
+
+
+def _time_along(points: Array) -> float:
+    """The time that a path (M, nv) takes at the largest velocities, in [s]."""
+    return float(np.abs(np.diff(points, axis=0)).max(axis=1).sum())
 
 
 def _stops(problem: TrajectoryProblem, start: Array) -> list[tuple[float, Array]]:
