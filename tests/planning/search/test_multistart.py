@@ -13,6 +13,7 @@ from hovi.discrete.grid import DiscretePath, Grid
 from hovi.discrete.guess import cubic, path_on_grid, with_bump
 from hovi.discrete.state import State
 from hovi.planning.paths.first_guesses import FirstGuesses
+from hovi.planning.search import multistart
 from hovi.planning.search.final_stages import FinalStages
 from hovi.planning.search.job import Job
 from hovi.planning.search.multistart import (
@@ -25,6 +26,7 @@ from hovi.planning.search.multistart import (
 )
 from hovi.planning.search.options import PlanOptions
 from hovi.planning.solver.action_objective import ActionObjective
+from hovi.planning.solver.methods import interior_point
 from hovi.planning.solver.solver import Solution, guess_path, solve_on_grid
 from hovi.planning.solver.status import Status
 from hovi.robot.loading import load_robot
@@ -325,3 +327,60 @@ def test_an_interrupt_within_a_solve_ends_the_search(
     assert 1 < found.done < 100
     assert calls < 110
     assert found.minima[0].success
+
+
+# A path around obstacles, and the direct guess
+
+
+DIVERGED, LIMIT, FOUND = Status.DIVERGED, Status.ITERATION_LIMIT, Status.MINIMUM
+
+
+@pytest.mark.parametrize(
+    ("answers", "ways"),
+    [
+        ([FOUND], ["path rows"]),
+        ([DIVERGED, FOUND], ["path rows", "direct rows"]),
+        ([DIVERGED, LIMIT, FOUND], ["path rows", "direct rows", "path points"]),
+        (
+            [DIVERGED, DIVERGED, LIMIT, FOUND],
+            ["path rows", "direct rows", "path points", "direct points"],
+        ),
+        ([LIMIT, LIMIT], ["path rows", "direct rows"]),
+    ],
+)
+def test_the_slower_way_comes_after_the_other_guess(
+    job: Job,
+    guesses: list,
+    monkeypatch: pytest.MonkeyPatch,
+    answers: list[Status],
+    ways: list[str],
+) -> None:
+    known, left, asked = search(job, guesses, 1)[0], list(answers), list[str]()
+
+    def solve(job: Job, free: object, guess: object, limit: object, way: object) -> Solution:
+        asked.append(f"{'path' if guess is guesses[1] else 'direct'} {way}")
+        status = left.pop(0)
+        return dataclasses.replace(known, status=status, success=status is FOUND)
+
+    monkeypatch.setattr(multistart, "_solve", solve)
+    monkeypatch.setattr(interior_point, "takes_rows", lambda problem: True)
+    first = FirstGuesses(guesses[0], 0.1, (guesses[1],))
+    found = explore(Pool(job, 1), first, 1, 0, silent)
+    assert asked == ways
+    assert found.done == len(ways)
+    assert found.minima[0].success == (FOUND in answers)
+    assert len(found.by_path) == sum("path" in each for each in ways)
+
+
+def test_where_distances_have_no_rows_every_guess_has_one_solve(
+    job: Job, guesses: list, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    known, asked = search(job, guesses, 1)[0], list[object]()
+
+    def solve(job: Job, free: object, guess: object, limit: object, way: object) -> Solution:
+        asked.append(way)
+        return dataclasses.replace(known, status=DIVERGED, success=False)
+
+    monkeypatch.setattr(multistart, "_solve", solve)
+    explore(Pool(job, 1), FirstGuesses(guesses[0], 0.1, (guesses[1],)), 1, 0, silent)
+    assert asked == [None, None]

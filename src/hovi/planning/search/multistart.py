@@ -7,11 +7,13 @@ one the best minima found so far (basin hopping). [WalesDoye1997]
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import os
 from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import field
 from functools import partial
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -34,6 +36,7 @@ from hovi.system.progress import Progress
 from hovi.workers.lost import Lost
 
 Array = npt.NDArray[np.float64]
+Way = Literal["rows", "points"]
 
 STARTS_PER_ROUND = 16
 """Starts per round; constant, so that results do not depend on the number of processes."""
@@ -72,9 +75,10 @@ class Pool:
     deadline: Deadline = field(default_factory=Deadline)
     free: FreeDuration | None = None
 
-    def solve_all(self, guesses: Sequence[DiscretePath]) -> Solved:
+    def solve_all(self, guesses: Sequence[DiscretePath], distances: Way | None = None) -> Solved:
         """The solutions from the guesses, without those whose process died.
 
+        distances: how they are bounded, see InteriorPoint; given only where it is the method.
         If worker processes cannot be started, the guesses are solved in this one. Raises
         KeyboardInterrupt after an interrupt if there is no solution yet.
         """
@@ -82,7 +86,7 @@ class Pool:
         try:
             if min(self.processes, len(guesses)) > 1:
                 self._in_workers(guesses, results)
-            self._here(guesses, results)
+            self._here(guesses, results, distances)
         except KeyboardInterrupt:
             record_interrupt()
             if not results:
@@ -101,14 +105,20 @@ class Pool:
         with closing(found):
             results.update(found)
 
-    def _here(self, guesses: Sequence[DiscretePath], results: dict[int, Solution | Lost]) -> None:
+    def _here(
+        self,
+        guesses: Sequence[DiscretePath],
+        results: dict[int, Solution | Lost],
+        distances: Way | None = None,
+    ) -> None:
         """Add the results that are missing; none of them if the time limit is why."""
         for i, guess in enumerate(guesses):
             if i in results:
                 continue
             if results and self.deadline.passed:
                 return
-            results[i] = solution = _solve(self.job, self.free, guess, self.deadline.seconds_left)
+            left = self.deadline.seconds_left
+            results[i] = solution = _solve(self.job, self.free, guess, left, distances)
             if solution.status is Status.INTERRUPTED:
                 return
 
@@ -123,18 +133,31 @@ def _solved(results: dict[int, Solution | Lost], interrupted: bool = False) -> S
 
 
 def _solve(
-    job: Job, free: FreeDuration | None, guess: DiscretePath, time_limit: float | None
+    job: Job,
+    free: FreeDuration | None,
+    guess: DiscretePath,
+    time_limit: float | None,
+    distances: Way | None = None,
 ) -> Solution:
     """The solution from one guess, without the problem, which is not sent."""
     problem, most = job.problem(), job.options.max_iterations
-    solution = None
+    solution = method = None
+    if distances is not None:
+        from hovi.planning.solver.methods.interior_point import InteriorPoint  # 10 ms
+
+        method = InteriorPoint(distances=distances)
     if free is not None:
         from hovi.planning.search.joint_duration import joint_minimum  # rarely needed
 
         solution = joint_minimum(free, problem, guess, most, time_limit, barrier=job.barrier)
     if solution is None:
         solution = solve_on_grid(
-            problem, guess, max_iterations=most, time_limit=time_limit, barrier=job.barrier
+            problem,
+            guess,
+            max_iterations=most,
+            time_limit=time_limit,
+            method=method,
+            barrier=job.barrier,
         )
     price = 0.0 if free is None else free.weight * solution.trajectory.duration
     return dataclasses.replace(solution, problem=None, cost=solution.cost + price)
@@ -189,18 +212,14 @@ def explore(
     KeyboardInterrupt and the pool's deadline end the exploration with the solutions so far, and so
     does a round of which every process dies.
     """
+    if starts == 1 and first.paths:
+        return _from_path_or_direct(pool, first, progress)
     one = pool.solve_all(first.all[:starts])
     solutions, lost = one.solutions, one.lost
     ended = stopped = one.interrupted
     numbered = zip(one.numbers, one.solutions, strict=True)
     by_path = tuple(x.trajectory for number, x in numbered if number < len(first.paths))
     try:
-        if starts == 1 and first.paths and not (ended or one.lost or pool.deadline.passed):
-            if not solutions[0].success:
-                progress("from the direct guess", 0.5)
-                again = pool.solve_all([first.direct])
-                solutions, stopped = solutions + again.solutions, again.interrupted
-            ended = True
         while not (ended or pool.deadline.passed):
             tried = len(solutions) + len(lost)
             if tried >= starts:
@@ -218,6 +237,44 @@ def explore(
         stopped = True
     minima = distinct(solutions)
     return Exploration(minima, len(solutions), stopped, tuple(lost), first, by_path)
+
+
+def _from_path_or_direct(pool: Pool, first: FirstGuesses, progress: Progress) -> Exploration:
+    """A single start: a path, and the direct guess where that fails.
+
+    Where both fail with rows of distances, both begin again with distances at quadrature points,
+    which take longer than the other guess with rows.
+    """
+    from hovi.planning.solver.methods.interior_point import WITHOUT_MOTION, takes_rows  # 10 ms
+
+    ways: tuple[Way | None, ...] = (None,)
+    if pool.free is None and takes_rows(pool.job.problem()):
+        ways = "rows", "points"
+    guesses = first.paths[0], first.direct
+    tried, lost, stopped = list[tuple[int, Solution]](), list[str](), False
+    failed = {0, 1}  # guesses that another way may help
+    for way, i in itertools.product(ways, (0, 1)):
+        if i not in failed:
+            continue
+        if tried:
+            progress("from the direct guess" if i == 1 else "from the path, at points", 0.5)
+        try:
+            found = pool.solve_all([guesses[i]], way)
+        except KeyboardInterrupt:
+            if not tried:
+                raise
+            record_interrupt()
+            stopped = True
+            break
+        tried += [(i, each) for each in found.solutions]
+        lost, stopped = [*lost, *found.lost], found.interrupted
+        if any(each.success for each in found.solutions) or stopped or pool.deadline.passed:
+            break
+        if not any(each.status in WITHOUT_MOTION for each in found.solutions):
+            failed.discard(i)
+    minima = distinct([each for _, each in tried])
+    by_path = tuple(each.trajectory for i, each in tried if i == 0)
+    return Exploration(minima, len(tried), stopped, tuple(lost), first, by_path)
 
 
 def _round(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from functools import partial
+from typing import Literal
 
 import numpy as np
 
@@ -25,6 +26,15 @@ from hovi.planning.solver.status import Status, diverged, infeasible_sentence, u
 from hovi.system.deadline import Deadline, OutOfTimeError
 from hovi.system.interruption import record_interrupt
 
+WITHOUT_MOTION = Status.INFEASIBLE, Status.DIVERGED, Status.SADDLE
+"""Results of a solve with rows of distances after which one at quadrature points may help."""
+
+
+def takes_rows(problem: TrajectoryProblem) -> bool:
+    """Whether distances can be bounded by rows where pairs come near."""
+    limited = problem.limits is not None and bool(problem.limits.bounded.any())
+    return problem.distances is not None and problem.ld.chart is None and limited
+
 
 class InteriorPoint(Method):
     """A primal-dual interior-point method; passive torques by an augmented Lagrangian around it.
@@ -35,11 +45,19 @@ class InteriorPoint(Method):
     along: the central path of a similar problem on the same intervals, where it starts; None to
         start from the guess. level: the barrier parameter at which it starts, relative to the mean
         density of the cost; None to infer it from how far the ends have moved.
+    distances: how they are bounded: by "rows" where pairs come near, at quadrature "points", which
+        takes several times as long, or in the second way where the first one fails, if None.
     """
 
-    def __init__(self, along: CentralPath | None = None, level: float | None = None) -> None:
+    def __init__(
+        self,
+        along: CentralPath | None = None,
+        level: float | None = None,
+        distances: Literal["rows", "points"] | None = None,
+    ) -> None:
         self.along = along
         self.level = level
+        self.distances = distances
 
     def supports(self, problem: TrajectoryProblem) -> bool:
         """Problems with limits or obstacles, with or without equality constraints."""
@@ -65,12 +83,11 @@ class InteriorPoint(Method):
     ) -> MethodResult:
         """With rows for distances where pairs come near; in rounds where that is not supported."""
         rounds = partial(with_active_pairs, partial(self._minimize, report=report), report=report)
-        limited = problem.limits is not None and bool(problem.limits.bounded.any())
-        if problem.distances is None or problem.ld.chart is not None or not limited:
+        if self.distances == "points" or not takes_rows(problem):
             return rounds(problem, path, options)
         deadline = Deadline(options.time_limit)
         found = self._minimize(problem, path, options, report, lazy=True)
-        if found.status not in (Status.INFEASIBLE, Status.DIVERGED, Status.SADDLE):
+        if self.distances == "rows" or found.status not in WITHOUT_MOTION:
             return found
         options = dataclasses.replace(options, time_limit=deadline.seconds_left)
         again = rounds(problem, path, options)
