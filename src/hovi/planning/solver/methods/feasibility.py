@@ -113,7 +113,16 @@ def _solved_nearby(search: BoundedSearch, path: DiscretePath) -> Bounded | None:
         search.near = None if search.near is None else search.no_near_rows()
         outcome = solved_from(search, path)
     search.options = whole
-    return outcome if outcome.settled else None
+    if outcome.settled:
+        return outcome
+    left = whole.max_iterations - outcome.iterations
+    if outcome.stop is not Stop.ITERATION_LIMIT or not outcome.feasible or left <= 0:
+        return None
+    # better than the guess, from which the solve would begin again
+    search.options = dataclasses.replace(whole, max_iterations=left)
+    outcome = search.solve(outcome.x, outcome.barrier)
+    search.options = whole
+    return outcome if outcome.stop is not Stop.DIVERGED else None
 
 
 def _solved_at_all(search: BoundedSearch, path: DiscretePath) -> Bounded:
