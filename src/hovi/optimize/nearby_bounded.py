@@ -43,8 +43,8 @@ GAP_WEIGHT = 3.0
 ROOM = 2e-7
 """Distance by which bounds are moved inwards, and outputs may miss them at the end."""
 LARGEST_GROWTH, LEAST_OUTSIDE = 4.0, 3e-4
-"""How far outputs may be outside after a step, relative to how far they were at first, or to the
-least such distance: beyond, it does not converge."""
+"""How far outputs may be outside after a step, relative to how far they were at first from their
+bounds or from the known slacks, or to the least such distance: beyond, it does not converge."""
 
 
 def follow_bounded(
@@ -87,7 +87,8 @@ class _Newton(Generic[X]):
         self.last_mu = options.barrier * self.density
         self.weight = GAP_WEIGHT * self.density
         outside = float(known.outside(outputs.y).max(initial=0.0))
-        self.farthest = LARGEST_GROWTH * max(outside, LEAST_OUTSIDE)
+        apart = float(np.max(np.abs(outputs.y - known.s), initial=0.0))
+        self.farthest = LARGEST_GROWTH * max(outside, LEAST_OUTSIDE, apart)
         mu = min(FIRST_MU * outside**2, LARGEST_FIRST_MU) * self.density
         outcome.barrier = known.recentered(self.weight, max(self.last_mu, mu))
         self.outside, self.work = 0.0, math.inf
