@@ -26,6 +26,7 @@ from hovi.optimize.bounded_objective import Refinement
 from hovi.planning.problem.limits import Limits
 from hovi.planning.solver.limits.limited_coordinates import LimitedCoordinates
 from hovi.planning.solver.limits.limited_parts import LimitedParts
+from hovi.planning.solver.limits.row_forces import RowsAtNodes
 from hovi.robot.space.configuration_space import ConfigurationSpace
 from hovi.schemes.control_points import control_degree, control_nodes, control_rows
 from hovi.schemes.scheme import regular_from_nodal
@@ -56,7 +57,13 @@ class LimitRows:
     fixed_ends: whether the start and the goal are given, and with them the control points there.
     halvings: of all intervals for the control points of positions, and for those of derivatives.
     barrier: the last barrier parameter, relative to the mean density of the cost.
+
+    bounds: lower and upper ones of the E rows, (E,) each. weights: of the rows in a barrier, (E,), in
+    [s]. at_nodes: see `forces_of`, which keeps it here.
     """
+
+    bounds: tuple[Array, Array]
+    weights: Array
 
     def __init__(
         self,
@@ -101,6 +108,7 @@ class LimitRows:
         rows = copy.copy(self)
         rows.grid = grid
         powers = (grid.duration / self.grid.duration) ** -self.orders[:, None].astype(float)
+        rows.weights, rows.at_nodes, rows._nodal = rows._share_of_intervals(), None, None
         rows._regular, rows._beyond = self._regular * powers, self._beyond * powers
         return rows
 
@@ -146,19 +154,6 @@ class LimitRows:
         return len(self._rows.part)
 
     @property
-    def bounds(self) -> tuple[Array, Array]:
-        """Lower and upper bounds of the rows, (E,) each."""
-        c = self.coordinate
-        k = np.minimum(self.intervals, len(self.of.lower) - 1)
-        lower, upper = (each[k, c] / self.of.ranges[c] for each in (self.of.lower, self.of.upper))
-        return lower, upper
-
-    @property
-    def weights(self) -> Array:
-        """Weights in a barrier, shape (E,), in [s]."""
-        return np.asarray(WEIGHT * self.grid.steps[self.intervals])
-
-    @property
     def table(self) -> Array:
         """y range h^j, without q0, over (h q0', ..., Z, c) of the interval, (E, 2 k - 1 + r)."""
         return self._rows.table
@@ -173,23 +168,28 @@ class LimitRows:
         """Derivatives of y in the columns of the interval, shape (E, m)."""
         if coordinates == "regular":
             return self._regular
-        nodal = self._regular @ regular_from_nodal(self.grid.inner_modes, self.grid.order)
-        return np.ascontiguousarray(nodal)
+        if self._nodal is None:
+            nodal = self._regular @ regular_from_nodal(self.grid.inner_modes, self.grid.order)
+            self._nodal = np.ascontiguousarray(nodal)
+        return self._nodal
 
     def refine(self, path: DiscretePath, level: float) -> Refinement | None:
         """Halve parts whose control points, away from the curve, raise the cost; None if none do.
 
         level: barrier parameter at the path, relative to the mean density of the cost.
         """
+        if self.fixed or self.size == 0:
+            return None
+        coarse = self._coarse(path, level)
+        if len(coarse) == 0:
+            return None
         numbers, before = np.arange(self.size), self._places
-        for _ in range(0 if self.fixed or self.size == 0 else MAX_HALVINGS):
+        for _ in range(MAX_HALVINGS):
+            numbers = self._halve(coarse, numbers)
             coarse = self._coarse(path, level)
             if len(coarse) == 0:
                 break
-            numbers = self._halve(coarse, numbers)
         kept = numbers[numbers >= 0]
-        if len(kept) == len(before):
-            return None
         return Refinement(kept, self._origins(before, len(kept)))
 
     def _coarse(self, path: DiscretePath, level: float) -> Index:
@@ -220,11 +220,19 @@ class LimitRows:
         self._rows = rows
         self.intervals, self.coordinate = self.parts.k[rows.part], self.parts.coordinate[rows.part]
         self.orders, self.joints = self.of.order[self.coordinate], self.of.joint[self.coordinate]
+        self.at_nodes: list[RowsAtNodes] | None = None
+        self._nodal: Array | None = None
         ranges = self.of.ranges[self.coordinate]
+        k = np.minimum(self.intervals, len(self.of.lower) - 1)
+        lower, upper = (each[k, self.coordinate] for each in (self.of.lower, self.of.upper))
+        self.bounds, self.weights = (lower / ranges, upper / ranges), self._share_of_intervals()
         scale = 1.0 / (ranges * self.grid.steps[self.intervals] ** self.orders)[:, None]
         base = np.where(self.orders == 0, 1.0 / ranges, 0.0)[:, None]
         self._regular = np.concatenate([base, rows.table * scale], axis=1)
         self._beyond = (rows.table - rows.beside) * scale
+
+    def _share_of_intervals(self) -> Array:
+        return np.asarray(WEIGHT * self.grid.steps[self.intervals])
 
     def _rows_of(self, parts: LimitedParts) -> _Rows:
         """The rows of parts."""
