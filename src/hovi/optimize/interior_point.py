@@ -190,7 +190,7 @@ class _Iteration(BoundedSteps[X]):
 
     def _try(self, step: BoundedStep, model: QuadraticModel) -> bool:
         outcome, trial, along = self.outcome, step.trial, step.along
-        barrier = outcome.barrier.with_mu(step.mu)
+        barrier = step.barrier
         moved_step = step.share * trial.step
         x = self.objective.retract(outcome.x, moved_step, model)
         before = outcome.outputs.value + self._hold(step.reaction, 1.0)
@@ -199,7 +199,7 @@ class _Iteration(BoundedSteps[X]):
         except BaseException:  # the multipliers stay those of the current point
             self._hold(step.reaction, -1.0)
             raise
-        old = before + barrier.merit(outcome.outputs.y, self.penalty, along, 0.0)
+        old = before + step.before
         new, moved = math.inf, barrier
         if np.isfinite(outputs.value):
             moved = barrier.moved(outputs.y, along, step.share, self.penalty)

@@ -58,12 +58,14 @@ class LimitRows:
     halvings: of all intervals for the control points of positions, and for those of derivatives.
     barrier: the last barrier parameter, relative to the mean density of the cost.
 
-    bounds: lower and upper ones of the E rows, (E,) each. weights: of the rows in a barrier, (E,), in
-    [s]. at_nodes: see `forces_of`, which keeps it here.
+    bounds: lower and upper ones of the E rows, (E,) each. weights: of the rows in a barrier, (E,),
+    in [s]. at_nodes: see `forces_of`, which keeps it here.
     """
 
     bounds: tuple[Array, Array]
     weights: Array
+    at_nodes: list[RowsAtNodes] | None
+    _nodal: Array | None
 
     def __init__(
         self,
@@ -220,8 +222,7 @@ class LimitRows:
         self._rows = rows
         self.intervals, self.coordinate = self.parts.k[rows.part], self.parts.coordinate[rows.part]
         self.orders, self.joints = self.of.order[self.coordinate], self.of.joint[self.coordinate]
-        self.at_nodes: list[RowsAtNodes] | None = None
-        self._nodal: Array | None = None
+        self.at_nodes, self._nodal = None, None
         ranges = self.of.ranges[self.coordinate]
         k = np.minimum(self.intervals, len(self.of.lower) - 1)
         lower, upper = (each[k, self.coordinate] for each in (self.of.lower, self.of.upper))
