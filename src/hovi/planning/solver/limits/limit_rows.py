@@ -33,6 +33,7 @@ from hovi.schemes.scheme import regular_from_nodal
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]
+Mask = npt.NDArray[np.bool_]
 
 WEIGHT = 0.1
 """Weight of a row in a barrier, as a share of the interval."""
@@ -183,33 +184,34 @@ class LimitRows:
         if self.fixed or self.size == 0:
             return None
         coarse = self._coarse(path, level)
-        if len(coarse) == 0:
+        if not coarse.any():
             return None
         numbers, before = np.arange(self.size), self._places
         for _ in range(MAX_HALVINGS):
             numbers = self._halve(coarse, numbers)
             coarse = self._coarse(path, level)
-            if len(coarse) == 0:
+            if not coarse.any():
                 break
         kept = numbers[numbers >= 0]
         return Refinement(kept, self._origins(before, len(kept)))
 
-    def _coarse(self, path: DiscretePath, level: float) -> Index:
-        """The parts that are worth halving."""
+    def _coarse(self, path: DiscretePath, level: float) -> Mask:
+        """Which parts are worth halving, shape (L,)."""
         y, (lower, upper) = self.values(path), self.bounds
         outside = push_rows(self, self._beyond, self._data(path))
         slack = np.maximum(np.where(outside > 0, upper - y, y - lower), 1e-12)
         gap, force = np.abs(outside), level / slack
         loss = self.weights / self.grid.duration * force * gap
-        some = (gap > max(LEAST_GAP, level)) & (loss > LEAST_LOSS)
-        return np.unique(self._rows.part[some & (loss.sum() > self.max_loss)])
+        coarse = np.zeros(len(self.parts), dtype=bool)
+        if loss.sum() > self.max_loss:
+            some = (gap > max(LEAST_GAP, level)) & (loss > LEAST_LOSS)
+            coarse[self._rows.part[some]] = True
+        return coarse
 
-    def _halve(self, coarse: Index, numbers: Index) -> Index:
+    def _halve(self, coarse: Mask, numbers: Index) -> Index:
         """Halve parts; returns the given numbers of the rows that remain, and -1 for the new."""
-        kept = np.flatnonzero(~np.isin(self._rows.part, coarse))
-        remaining = np.setdiff1d(np.arange(len(self.parts)), coarse)
-        places = np.zeros(len(self.parts), dtype=np.intp)
-        places[remaining] = np.arange(len(remaining))
+        kept, remaining = np.flatnonzero(~coarse[self._rows.part]), np.flatnonzero(~coarse)
+        places = np.cumsum(~coarse) - 1
         old, new = self._rows.at(kept), self.parts.at(coarse).halves()
         rows = self._rows_of(new)
         both = old._replace(part=places[old.part]), rows._replace(part=rows.part + len(remaining))
@@ -250,7 +252,7 @@ class LimitRows:
             found.append(_Rows(own[part], i, table, beside))
         return _Rows(*(np.concatenate(each) for each in zip(*found, strict=True)))
 
-    def _needed(self, parts: LimitedParts, order: int) -> npt.NDArray[np.bool_]:
+    def _needed(self, parts: LimitedParts, order: int) -> Mask:
         """Which control points get rows, shape (L, d + 1): others are given.
 
         One at which two parts meet belongs to the part before, and where an interval has other
