@@ -17,7 +17,7 @@ from hovi.optimize.bordered_model import EquationModel
 from hovi.optimize.bounded_objective import BoundedOutcome, Outputs
 from hovi.optimize.interior_point import minimize_bounded
 from hovi.optimize.merge_tree import MergeTreeModel
-from hovi.optimize.nearby_bounded import follow_bounded
+from hovi.optimize.nearby_bounded import ROOM, follow_bounded
 from hovi.optimize.trust_region import Iteration, Options, Stop
 from hovi.planning.clearance.clearance import DISTANCE_SCALE
 from hovi.planning.clearance.clearance_violation import (
@@ -285,12 +285,17 @@ class BoundedSearch:
         return self._noted(outcome, objective)
 
     def followed(
-        self, objective: BoundedAction, path: DiscretePath, known: Barrier, options: Options
+        self,
+        objective: BoundedAction,
+        path: DiscretePath,
+        known: Barrier,
+        options: Options,
+        most_outside: float = ROOM,
     ) -> Bounded:
         """A solve of an objective from the solution of a similar problem: see follow_bounded."""
         raise_if_late()
         known = dataclasses.replace(known, bounds=objective.bounds)
-        outcome = follow_bounded(objective, path, known, options, self.report)
+        outcome = follow_bounded(objective, path, known, options, self.report, most_outside)
         return self._noted(outcome, objective)
 
     def _noted(self, outcome: Bounded, objective: BoundedAction) -> Bounded:
