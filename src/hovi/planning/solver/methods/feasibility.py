@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator
+from itertools import chain
 
 import numpy as np
 
@@ -110,16 +110,13 @@ def _solved_nearby(search: BoundedSearch, path: DiscretePath) -> Bounded | None:
         search.near = None if search.near is None else search.no_near_rows()
         outcome = solved_from(search, path)
     search.options = whole
-    if outcome.settled:
-        return outcome
     left = whole.max_iterations - outcome.iterations
-    if outcome.stop is not Stop.ITERATION_LIMIT or not outcome.feasible or left <= 0:
-        return None
-    # better than the guess, from which the solve would begin again
-    search.options = dataclasses.replace(whole, max_iterations=left)
-    outcome = search.solve(outcome.x, outcome.barrier)
-    search.options = whole
-    return outcome if outcome.stop is not Stop.DIVERGED else None
+    if outcome.stop is Stop.ITERATION_LIMIT and outcome.feasible and left > 0:  # it goes on there
+        search.options = dataclasses.replace(whole, max_iterations=left)
+        outcome = search.solve(outcome.x, outcome.barrier)
+        search.options = whole
+        return outcome if outcome.stop is not Stop.DIVERGED else None
+    return outcome if outcome.settled else None
 
 
 def _solved_at_all(search: BoundedSearch, path: DiscretePath) -> Bounded:
@@ -338,7 +335,8 @@ def _restored(search: BoundedSearch, outcome: Bounded) -> tuple[Bounded, str]:
     objective = search.objective(known)
     density = mean_density(outcome.outputs, objective.bounds.measure)
     least = np.inf
-    for guess in _guesses(search):
+    bumped = (_bumped_guess(search, seed) for seed in range(BUMPED_GUESSES))
+    for guess in chain([search.guess], bumped):
         path, violation, stop = _penalized(search, objective, guess, density)
         if stop in STOPPED:
             outcome.stop = stop
@@ -373,13 +371,6 @@ def _without_forces(
     objective = search.objective(known)
     outputs = objective.outputs(path)
     return objective, outputs, Barrier.inactive(objective.bounds, outputs.y)
-
-
-def _guesses(search: BoundedSearch) -> Iterator[DiscretePath]:
-    """The guess, then perturbations of it."""
-    yield search.guess
-    for seed in range(BUMPED_GUESSES):
-        yield _bumped_guess(search, seed)
 
 
 def _bumped_guess(search: BoundedSearch, seed: int, share: float = 1.0) -> DiscretePath:
