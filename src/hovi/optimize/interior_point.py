@@ -73,9 +73,9 @@ second of these, if the objective reopens; others begin with a radius that is wi
 SHORT_SHARE = 0.1
 """Share of a step at the radius below which it was too long for the bounds that cut it."""
 CUT_SHARE, MOST_CUT, RAISED = 0.5, 4, 10.0
-"""Share below which the bounds cut a step, how many such steps of models that are not convex follow
-each other before the barrier parameter rises, and by how much: it has fallen too early, and steps
-along the bounds would be short for as long as there is curvature to leave."""
+"""Share below which the bounds cut a step of a model that is not convex, how many such steps, or
+ones of less than SHORT_SHARE, follow each other before the barrier parameter rises, and by how
+much: it has fallen too early, and steps along the bounds would stay short."""
 LEAST_RAISED_GAP = 1e-9
 """Least distance of slacks from their bounds then, relative to the range."""
 MATCHED = 1e-4
@@ -231,7 +231,7 @@ class _Iteration(BoundedSteps[X]):
         outcome.keep_best(self.objective.bounds)
         if self.cautious:
             self._reduce_mu(step)
-            self._raise_mu(step)
+        self._raise_mu(step)
         self.cautious = self.plain
         self.product = outcome.barrier.mean_product()
         self.violations.append(float(outcome.violation.max(initial=0.0)))
@@ -325,9 +325,9 @@ class _Iteration(BoundedSteps[X]):
             self.penalty = 0.0
 
     def _raise_mu(self, step: BoundedStep) -> None:
-        """Raise mu where bounds cut one step after another of models that are not convex."""
+        """Raise mu where bounds cut one step after another, most of all where curvature is left."""
         outcome, objective = self.outcome, self.objective
-        cut = step.share < CUT_SHARE and not step.trial.newton
+        cut = step.share < (SHORT_SHARE if step.trial.newton else CUT_SHARE)
         self.cut = self.cut + 1 if cut and outcome.feasible and not objective.reopens else 0
         mu = min(RAISED * max(outcome.barrier.mu, self.product), INITIAL_MU * self.density)
         if self.cut < MOST_CUT or mu <= outcome.barrier.mu:
