@@ -66,6 +66,22 @@ def test_the_solution_of_a_nearby_problem_is_found_in_a_few_steps(seed: int) -> 
     assert excess(second, found.x) <= 0.0
 
 
+def test_where_the_objective_alone_is_sought_fewer_steps_give_it() -> None:
+    fewer = 0
+    for seed in range(5):
+        first, second = random_problem(seed, 0.01)
+        known, cold = solved(first, np.zeros(20)), solved(second, np.zeros(20))
+        whole = follow(second, known)
+        barrier = dataclasses.replace(known.barrier, bounds=second.bounds)
+        loose = dataclasses.replace(OPTIONS, enough=1e-3)
+        found = follow_bounded(second, known.x, barrier, loose, most_outside=5e-3)
+        assert found.stop is Stop.STATIONARY
+        assert found.outputs.value == pytest.approx(cold.outputs.value, rel=1e-3)
+        assert found.iterations <= whole.iterations
+        fewer += whole.iterations - found.iterations
+    assert fewer >= 1
+
+
 def test_the_same_problem_takes_one_step() -> None:
     problem, _ = random_problem(0, 0.0)
     found = follow(problem, solved(problem, np.zeros(20)))

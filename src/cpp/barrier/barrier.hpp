@@ -1,265 +1,374 @@
 // The logarithmic barrier of slacks between bounds: its Newton steps and their lengths.
+//
+// Several slacks are done at a time, in the lanes of a pack, and the last ones one by one: functions
+// of a type V are for both. Everything is in an unnamed namespace: see simd/dispatch.hpp.
 #pragma once
 
-#include <algorithm>
-#include <cmath>
 #include <cstddef>
-#include <limits>
+
+#include "kernels.hpp"
+#include "simd/pack.hpp"
 
 namespace hovi::barrier {
+namespace {
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
+constexpr double infinity = __builtin_inf();
 constexpr double least_gap = 1e-16;  // the rounding unit at a bound of one
 constexpr double rounding = 1e-10;   // of a slack, as a share of its gap
 constexpr double released = 1e-2;    // how far an output may move from a bound that lets it go
 
-// R slacks s with multipliers zl, zu; infinite bounds are none.
-struct Slacks {
-  std::size_t count;
-  const double *lower, *upper, *s, *zl, *zu;
+inline Pack read(const double* x, const Pack&) { return load(x); }
+inline double read(const double* x, double) { return *x; }
+inline void write(double* x, const Pack& value) { store(x, value); }
+inline void write(double* x, double value) { *x = value; }
+inline Pack all_lanes(double x, const Pack&) { return broadcast(x); }
+inline double all_lanes(double x, double) { return x; }
+inline double root(double x) { return __builtin_sqrt(x); }
+inline Pack root(Pack x) {
+  for (std::size_t lane = 0; lane < lanes; ++lane) x[lane] = __builtin_sqrt(x[lane]);
+  return x;
+}
 
-  double below(std::size_t i) const { return std::max(s[i] - lower[i], least_gap); }
-  double above(std::size_t i) const { return std::max(upper[i] - s[i], least_gap); }
-  bool has_lower(std::size_t i) const { return lower[i] > -infinity; }
-  bool has_upper(std::size_t i) const { return upper[i] < infinity; }
+// As std::max and std::min: the first where one of them is no number.
+template <typename V>
+inline V larger(const V& a, const V& b) {
+  return a < b ? b : a;
+}
+template <typename V>
+inline V smaller(const V& a, const V& b) {
+  return b < a ? b : a;
+}
+template <typename V>
+inline V magnitude(const V& x) {
+  return x < 0.0 ? -x : x;
+}
+template <typename V>
+inline V between(const V& x, const V& low, const V& high) {
+  return smaller(larger(x, low), high);
+}
+
+// Calls work(i, V) for the numbers from 0: with a pack for as many as fill its lanes.
+template <typename Work>
+inline void over(std::size_t count, const Work& work) {
+  const std::size_t whole = count - count % lanes;
+  for (std::size_t i = 0; i < whole; i += lanes) work(i, Pack{});
+  for (std::size_t i = whole; i < count; ++i) work(i, 0.0);
+}
+
+// A number in every lane, and that of the last slacks.
+struct Reduced {
+  explicit Reduced(double x) : packs(broadcast(x)), rest(x) {}
+  Pack& of(const Pack&) { return packs; }
+  double& of(double) { return rest; }
+  double total() const { return sum(packs) + rest; }
+  double largest() const {
+    double most = rest;
+    for (std::size_t lane = 0; lane < lanes; ++lane) most = larger<double>(most, packs[lane]);
+    return most;
+  }
+  double smallest() const {
+    double least = rest;
+    for (std::size_t lane = 0; lane < lanes; ++lane) least = smaller<double>(least, packs[lane]);
+    return least;
+  }
+  Pack packs;
+  double rest;
 };
 
-// Newton's direction of slacks and multipliers.
-struct Direction {
-  double *s, *zl, *zu;
+// Slacks from number i on.
+template <typename V>
+struct Some {
+  Some(const Slacks& at, std::size_t i, const V& kind)
+      : lower(read(at.lower + i, kind)),
+        upper(read(at.upper + i, kind)),
+        s(read(at.s + i, kind)),
+        zl(read(at.zl + i, kind)),
+        zu(read(at.zu + i, kind)),
+        gap(all_lanes(least_gap, kind)),
+        zero(all_lanes(0.0, kind)),
+        below(larger<V>(s - lower, gap)),
+        above(larger<V>(upper - s, gap)) {}
+
+  // The first where there is the bound, else the second.
+  V where_lower(const V& a, const V& b) const { return lower > -infinity ? a : b; }
+  V where_upper(const V& a, const V& b) const { return upper < infinity ? a : b; }
+
+  V lower, upper, s, zl, zu, gap, zero, below, above;
 };
 
-// sigma = zl/below + zu/above, rho = mu/above - mu/below + sigma (y - s), force = zu - zl.
-inline void condense(const Slacks& at, const double* y, double mu, double* sigma, double* rho,
-                     double* force) {
-  for (std::size_t i = 0; i < at.count; ++i) {
-    const double below = 1.0 / at.below(i), above = 1.0 / at.above(i);
-    sigma[i] = at.zl[i] * below + at.zu[i] * above;
-    rho[i] = mu * above - mu * below + sigma[i] * (y[i] - at.s[i]);
-    force[i] = at.zu[i] - at.zl[i];
-  }
+void condense(const Slacks& at, const double* y, double mu, double* sigma, double* rho,
+              double* force) {
+  over(at.count, [&](std::size_t i, const auto& kind) {
+    const Some x(at, i, kind);
+    const auto below = 1.0 / x.below, above = 1.0 / x.above;
+    const auto curve = x.zl * below + x.zu * above;
+    write(sigma + i, curve);
+    write(rho + i, mu * above - mu * below + curve * (read(y + i, kind) - x.s));
+    write(force + i, x.zu - x.zl);
+  });
 }
 
-// rho for products z gap that aim at `lower` and `upper` instead of mu, less rho.
-inline void shift(const Slacks& at, double mu, const double* lower, const double* upper,
-                  double* out) {
-  for (std::size_t i = 0; i < at.count; ++i)
-    out[i] = (upper[i] - mu) / at.above(i) - (lower[i] - mu) / at.below(i);
+void shift(const Slacks& at, double mu, const double* lower, const double* upper, double* out) {
+  over(at.count, [&](std::size_t i, const auto& kind) {
+    const Some x(at, i, kind);
+    write(out + i, (read(upper + i, kind) - mu) / x.above - (read(lower + i, kind) - mu) / x.below);
+  });
 }
 
-// The largest share of a change that keeps a gap nonnegative.
-inline void limit(double gap, double change, double& share) {
-  if (change < 0.0) share = std::min(share, -gap / change);
+// The largest share of a change, up to one, that keeps a gap nonnegative.
+template <typename V>
+inline V share_of(const V& gap, const V& change, const V& whole) {
+  return change < 0.0 ? smaller<V>(whole, -gap / change) : whole;
 }
 
-struct Lengths {
-  double primal = 1.0, dual = 1.0, largest_force = 0.0, largest_residual = 0.0;
-};
-
-// The direction in which the products aim at their targets, and the lengths up to the boundary:
-// slacks that differ from their outputs by more than `matched` do not limit it, but take at most
-// `keep` of their gaps. The largest force is that of the whole direction.
-inline Lengths aim(const Slacks& at, const double* y, const double* dy, const double* lower,
-                   const double* upper, double matched, double keep, const Direction& d) {
-  Lengths lengths;
-  for (std::size_t i = 0; i < at.count; ++i) {
-    const double below = at.below(i), above = at.above(i), residual = y[i] - at.s[i];
-    const bool equal = std::abs(residual) <= matched;
-    const auto dzl = [&](double ds) {
-      return at.has_lower(i) ? (lower[i] - at.zl[i] * ds) / below - at.zl[i] : 0.0;
-    };
-    const auto dzu = [&](double ds) {
-      return at.has_upper(i) ? (upper[i] + at.zu[i] * ds) / above - at.zu[i] : 0.0;
-    };
-    const double whole = dy[i] + residual;
-    const double ds = equal ? whole : std::clamp(whole, -keep * below, keep * above);
-    d.s[i] = ds, d.zl[i] = dzl(ds), d.zu[i] = dzu(ds);
-    if (equal) {
-      limit(below, ds, lengths.primal);
-      limit(above, -ds, lengths.primal);
-    }
-    limit(at.zl[i], d.zl[i], lengths.dual);
-    limit(at.zu[i], d.zu[i], lengths.dual);
-    const double force = std::abs(at.zu[i] + dzu(whole) - at.zl[i] - dzl(whole));
-    lengths.largest_force = std::max(lengths.largest_force, force);
-    lengths.largest_residual = std::max(lengths.largest_residual, std::abs(residual));
-  }
-  return lengths;
+Lengths aim(const Slacks& at, const double* y, const double* dy, const double* lower,
+            const double* upper, double matched, double keep, const Direction& d) {
+  Reduced primal(1.0), dual(1.0), largest_force(0.0), largest_residual(0.0);
+  over(at.count, [&](std::size_t i, const auto& kind) {
+    const Some x(at, i, kind);
+    const auto one = all_lanes(1.0, kind), residual = read(y + i, kind) - x.s;
+    const auto aim_low = read(lower + i, kind), aim_high = read(upper + i, kind);
+    const auto below = 1.0 / x.below, above = 1.0 / x.above;
+    const auto whole = read(dy + i, kind) + residual, off = magnitude(residual);
+    const auto ds = off <= matched ? whole : between(whole, -keep * x.below, keep * x.above);
+    const auto dzl = x.where_lower((aim_low - x.zl * ds) * below - x.zl, x.zero);
+    const auto dzu = x.where_upper((aim_high + x.zu * ds) * above - x.zu, x.zero);
+    write(d.s + i, ds);
+    write(d.zl + i, dzl);
+    write(d.zu + i, dzu);
+    const auto inside = smaller(share_of(x.below, ds, one), share_of(x.above, -ds, one));
+    const auto share = off <= matched ? inside : one;
+    primal.of(kind) = smaller(primal.of(kind), share);
+    const auto positive = smaller(share_of(x.zl, dzl, one), share_of(x.zu, dzu, one));
+    dual.of(kind) = smaller(dual.of(kind), positive);
+    const auto low = x.where_lower((aim_low - x.zl * whole) * below, x.zl);
+    const auto high = x.where_upper((aim_high + x.zu * whole) * above, x.zu);
+    largest_force.of(kind) = larger(largest_force.of(kind), magnitude(high - low));
+    largest_residual.of(kind) = larger(largest_residual.of(kind), off);
+  });
+  return {primal.smallest(), dual.smallest(), largest_force.largest(), largest_residual.largest()};
 }
 
-// The mean product of multipliers and gaps after shares of a direction.
-inline double mean_product(const Slacks& at, const Direction& d, double primal, double dual) {
-  double sum = 0.0;
-  std::size_t count = 0;
-  for (std::size_t i = 0; i < at.count; ++i) {
-    const double below = at.below(i), above = at.above(i);
-    const double ds = std::clamp(primal * d.s[i], -0.99 * below, 0.99 * above);
-    if (at.has_lower(i)) sum += (at.zl[i] + dual * d.zl[i]) * (below + ds), ++count;
-    if (at.has_upper(i)) sum += (at.zu[i] + dual * d.zu[i]) * (above - ds), ++count;
-  }
-  return count ? sum / double(count) : 0.0;
+double mean_product(const Slacks& at, const Direction& d, double primal, double dual) {
+  Reduced products(0.0), count(0.0);
+  over(at.count, [&](std::size_t i, const auto& kind) {
+    const Some x(at, i, kind);
+    const auto one = all_lanes(1.0, kind);
+    const auto ds = between(primal * read(d.s + i, kind), -0.99 * x.below, 0.99 * x.above);
+    const auto low = (x.zl + dual * read(d.zl + i, kind)) * (x.below + ds);
+    const auto high = (x.zu + dual * read(d.zu + i, kind)) * (x.above - ds);
+    products.of(kind) += x.where_lower(low, x.zero) + x.where_upper(high, x.zero);
+    count.of(kind) += x.where_lower(one, x.zero) + x.where_upper(one, x.zero);
+  });
+  return count.total() > 0.0 ? products.total() / count.total() : 0.0;
 }
 
-// The largest |z gap - mu|.
-inline double largest_miss(const Slacks& at, double mu) {
-  double largest = 0.0;
-  for (std::size_t i = 0; i < at.count; ++i) {
-    if (at.has_lower(i)) largest = std::max(largest, std::abs(at.zl[i] * at.below(i) - mu));
-    if (at.has_upper(i)) largest = std::max(largest, std::abs(at.zu[i] * at.above(i) - mu));
-  }
-  return largest;
+double largest_miss(const Slacks& at, double mu) {
+  Reduced largest(0.0);
+  over(at.count, [&](std::size_t i, const auto& kind) {
+    const Some x(at, i, kind);
+    const auto low = x.where_lower(magnitude(x.zl * x.below - mu), x.zero);
+    const auto high = x.where_upper(magnitude(x.zu * x.above - mu), x.zero);
+    largest.of(kind) = larger(larger(largest.of(kind), low), high);
+  });
+  return largest.largest();
 }
 
-// Targets that make up for the second-order terms of a direction: mu -/+ ds dz.
-inline void correct(const Slacks& at, const double* y, const Direction& d, double mu,
-                    double matched, double* lower, double* upper) {
-  for (std::size_t i = 0; i < at.count; ++i) {
-    const bool equal = std::abs(y[i] - at.s[i]) <= matched;
-    lower[i] = mu - (equal ? d.s[i] * d.zl[i] : 0.0);
-    upper[i] = mu + (equal ? d.s[i] * d.zu[i] : 0.0);
-  }
+void correct(const Slacks& at, const double* y, const Direction& d, double mu, double matched,
+             double* lower, double* upper) {
+  over(at.count, [&](std::size_t i, const auto& kind) {
+    const auto off = magnitude(read(y + i, kind) - read(at.s + i, kind));
+    const auto ds = off <= matched ? read(d.s + i, kind) : all_lanes(0.0, kind);
+    const auto zero = all_lanes(0.0, kind);
+    const auto low = ds * read(d.zl + i, kind), high = ds * read(d.zu + i, kind);
+    write(lower + i, mu - (off <= matched ? low : zero));
+    write(upper + i, mu + (off <= matched ? high : zero));
+  });
 }
 
 // How far a product is outside of [mu/10, 10 mu]; at most 10 mu are taken off.
-inline double outside(double product, double mu) {
-  if (product < 0.1 * mu) return 0.1 * mu - product;
-  return product > 10.0 * mu ? std::max(10.0 * mu - product, -10.0 * mu) : 0.0;
+template <typename V>
+inline V outside(const V& product, double mu, const V& zero) {
+  const V more = 0.1 * mu - product, less = larger<V>(10.0 * mu - product, zero - 10.0 * mu);
+  return product < 0.1 * mu ? more : product > 10.0 * mu ? less : zero;
 }
 
-// Targets that bring those products nearer to mu that longer shares of a direction would spoil.
-inline void center(const Slacks& at, const double* y, const Direction& d, double primal,
-                   double dual, double mu, double matched, double* lower, double* upper) {
-  for (std::size_t i = 0; i < at.count; ++i) {
-    if (std::abs(y[i] - at.s[i]) > matched) continue;
-    const double ds = primal * d.s[i];
-    if (at.has_lower(i))
-      lower[i] += outside((at.zl[i] + dual * d.zl[i]) * (at.below(i) + ds), mu);
-    if (at.has_upper(i))
-      upper[i] += outside((at.zu[i] + dual * d.zu[i]) * (at.above(i) - ds), mu);
-  }
+void center(const Slacks& at, const double* y, const Direction& d, double primal, double dual,
+            double mu, double matched, double* lower, double* upper) {
+  over(at.count, [&](std::size_t i, const auto& kind) {
+    const Some x(at, i, kind);
+    const auto off = magnitude(read(y + i, kind) - x.s);
+    const auto ds = primal * read(d.s + i, kind);
+    const auto low = (x.zl + dual * read(d.zl + i, kind)) * (x.below + ds);
+    const auto high = (x.zu + dual * read(d.zu + i, kind)) * (x.above - ds);
+    const auto more_low = x.where_lower(outside(low, mu, x.zero), x.zero);
+    const auto more_high = x.where_upper(outside(high, mu, x.zero), x.zero);
+    write(lower + i, read(lower + i, kind) + (off <= matched ? more_low : x.zero));
+    write(upper + i, read(upper + i, kind) + (off <= matched ? more_high : x.zero));
+  });
 }
 
-// sum w log(gap), with one logarithm for several gaps of the same weight.
+// sum log(gap) by lanes, with one logarithm for several gaps.
 class LogSum {
  public:
-  void add(double weight, double gap) {
-    if (weight != weight_ || product_ < 1e-200 || product_ > 1e200) flush(weight);
-    product_ *= gap;
+  template <typename V>
+  void add(const V& gaps) {
+    product_.of(gaps) *= gaps;
+    if (++factors_ == most_factors) flush();
   }
   double total() {
-    flush(0.0);
+    flush();
     return total_;
   }
 
  private:
-  void flush(double weight) {
-    if (product_ != 1.0) total_ += weight_ * std::log(product_);
-    weight_ = weight, product_ = 1.0;
+  // As long as every one of them is between 1e-16 and 1e16, their product is a number above 0.
+  static constexpr int most_factors = 16;
+
+  void flush() {
+    if (factors_ == 0) return;
+    for (std::size_t lane = 0; lane < lanes; ++lane) take(product_.packs[lane]);
+    take(product_.rest);
+    product_ = Reduced(1.0), factors_ = 0;
   }
-  double weight_ = 0.0, product_ = 1.0, total_ = 0.0;
+  void take(double product) {
+    if (product != 1.0) total_ += __builtin_log(product);
+  }
+  Reduced product_{1.0};
+  double total_ = 0.0;
+  int factors_ = 0;
 };
 
-// -mu sum w log(gaps) + penalty sum w |y - s| after a share of a direction, of which every slack
-// takes at most `keep` of its gap.
-inline double merit(const Slacks& at, const double* weights, const double* y, const double* dy,
-                    const double* ds, double share, double keep, double mu, double penalty) {
-  LogSum logs;
-  double misfit = 0.0;
-  for (std::size_t i = 0; i < at.count; ++i) {
-    const double below = at.below(i), above = at.above(i);
-    const double step = std::clamp(share * ds[i], -keep * below, keep * above);
-    if (at.has_lower(i)) logs.add(weights[i], below + step);
-    if (at.has_upper(i)) logs.add(weights[i], above - step);
-    misfit += weights[i] * std::abs(y[i] + share * dy[i] - at.s[i] - step);
-  }
-  return penalty * misfit - mu * logs.total();
+// The number from which on weights are others than that of a number.
+inline std::size_t end_of_weight(const double* weights, std::size_t first, std::size_t count) {
+  std::size_t last = first + 1;
+  while (last < count && weights[last] == weights[first]) ++last;
+  return last;
 }
 
-// Slacks and multipliers after shares of a direction. A slack becomes its output y where that is
-// inside of the bounds and lowers the merit, or next to it, and z gap stays within `ratio` of mu.
-inline void move(const Slacks& at, const double* y, const Direction& d, double primal, double dual,
-                 double keep, double mu, double penalty, double ratio, const Direction& out) {
-  for (std::size_t i = 0; i < at.count; ++i) {
-    const double below = at.below(i), above = at.above(i);
-    double s = at.s[i] + std::clamp(primal * d.s[i], -keep * below, keep * above);
-    const double low = y[i] - at.lower[i], high = at.upper[i] - y[i];
-    if (y[i] != s && low > least_gap && high > least_gap) {
-      const double off = std::abs(y[i] - s);
-      const double ratios = (at.has_lower(i) ? low / std::max(s - at.lower[i], least_gap) : 1.0) *
-                            (at.has_upper(i) ? high / std::max(at.upper[i] - s, least_gap) : 1.0);
-      if (off <= rounding * std::min(low, high) || -mu * std::log(ratios) < penalty * off) s = y[i];
-    }
-    out.s[i] = s;
-    const double center_low = mu / std::max(s - at.lower[i], least_gap);
-    const double center_high = mu / std::max(at.upper[i] - s, least_gap);
-    const double zl = at.zl[i] + dual * d.zl[i], zu = at.zu[i] + dual * d.zu[i];
-    out.zl[i] = at.has_lower(i) ? std::clamp(zl, center_low / ratio, center_low * ratio) : 0.0;
-    out.zu[i] = at.has_upper(i) ? std::clamp(zu, center_high / ratio, center_high * ratio) : 0.0;
+double merit(const Slacks& at, const double* weights, const double* y, const double* dy,
+             const double* ds, double share, double keep, double mu, double penalty) {
+  double barrier = 0.0, misfits = 0.0;
+  for (std::size_t first = 0, last; first < at.count; first = last) {
+    last = end_of_weight(weights, first, at.count);
+    LogSum logs;
+    Reduced misfit(0.0);
+    over(last - first, [&](std::size_t k, const auto& kind) {
+      const std::size_t i = first + k;
+      const Some x(at, i, kind);
+      const auto one = all_lanes(1.0, kind);
+      const auto step = between(share * read(ds + i, kind), -keep * x.below, keep * x.above);
+      logs.add(x.where_lower(x.below + step, one));
+      logs.add(x.where_upper(x.above - step, one));
+      misfit.of(kind) +=
+          magnitude(read(y + i, kind) + share * read(dy + i, kind) - x.s - step);
+    });
+    barrier += weights[first] * logs.total();
+    misfits += weights[first] * misfit.total();
   }
+  return penalty * misfits - mu * barrier;
+}
+
+// Whether log(ratio) > least, mostly without a logarithm: 1 - 1/x <= log x <= x - 1.
+inline bool exceeds(double ratio, double least) {
+  if (1.0 - 1.0 / ratio > least) return true;
+  return ratio - 1.0 > least && __builtin_log(ratio) > least;
+}
+
+// Slack number i after a step to s, or its output.
+inline double moved_slack(const Slacks& at, std::size_t i, double y, double s, double mu,
+                          double penalty) {
+  const double lower = at.lower[i], upper = at.upper[i], low = y - lower, high = upper - y;
+  if (y == s || !(low > least_gap && high > least_gap)) return s;
+  const double off = magnitude(y - s);
+  if (off <= rounding * smaller(low, high)) return y;
+  const double ratios =
+      (lower > -infinity ? low / larger(s - lower, least_gap) : 1.0) *
+      (upper < infinity ? high / larger(upper - s, least_gap) : 1.0);
+  const bool lowers = mu > 0.0 ? exceeds(ratios, -penalty * off / mu) : 0.0 < penalty * off;
+  return lowers ? y : s;
+}
+
+void move(const Slacks& at, const double* y, const Direction& d, double primal, double dual,
+          double keep, double mu, double penalty, double ratio, const Direction& out) {
+  over(at.count, [&](std::size_t i, const auto& kind) {
+    const Some x(at, i, kind);
+    const auto step = between(primal * read(d.s + i, kind), -keep * x.below, keep * x.above);
+    write(out.s + i, x.s + step);
+  });
+  for (std::size_t i = 0; i < at.count; ++i)
+    out.s[i] = moved_slack(at, i, y[i], out.s[i], mu, penalty);
+  over(at.count, [&](std::size_t i, const auto& kind) {
+    const Some x(at, i, kind);
+    const auto s = read(out.s + i, kind);
+    const auto low = mu / larger(s - x.lower, x.gap), high = mu / larger(x.upper - s, x.gap);
+    const auto zl = x.zl + dual * read(d.zl + i, kind), zu = x.zu + dual * read(d.zu + i, kind);
+    write(out.zl + i, x.where_lower(between(zl, low / ratio, low * ratio), x.zero));
+    write(out.zu + i, x.where_upper(between(zu, high / ratio, high * ratio), x.zero));
+  });
 }
 
 // The gap of a bound at which gap z = mu and z - c gap = w: near 0 with z = w > 0, else -w/c.
-inline double central_gap(double w, double c, double mu) {
-  const double root = std::sqrt(w * w + 4.0 * c * mu);
-  return w > 0.0 ? 2.0 * mu / (root + w) : (root - w) / (2.0 * c);
+template <typename V>
+inline V central_gap(const V& w, const V& c, double mu) {
+  const V size = root(w * w + 4.0 * c * mu);
+  return w > 0.0 ? 2.0 * mu / (size + w) : (size - w) / (2.0 * c);
 }
 
-// The slack between two bounds at the gap of the one that matters more, by given differences w of
-// the multipliers and c gaps, and not beyond the middle; y without any bound.
-inline double central_slack(const Slacks& at, std::size_t i, double y, double low, double high,
-                            double c, double mu) {
-  const double half = 0.5 * (at.upper[i] - at.lower[i]);  // infinite with one bound
-  if (at.has_lower(i) && (!at.has_upper(i) || low >= high))
-    return at.lower[i] + std::min(central_gap(low, c, mu), half);
-  return at.has_upper(i) ? at.upper[i] - std::min(central_gap(high, c, mu), half) : y;
+// The slacks between two bounds at the gap of the one that matters more, by given differences w of
+// the multipliers and c gaps, and not beyond the middle; y without any bound. With the multipliers
+// with which their products z gap are mu. Returns the slacks, and zu - zl.
+template <typename V>
+inline V set_central(const Some<V>& x, std::size_t i, const V& y, const V& low, const V& high,
+                     const V& c, double mu, const Direction& out, V& force) {
+  const V half = 0.5 * (x.upper - x.lower);  // infinite with one bound
+  const V from_lower = x.lower + smaller<V>(central_gap(low, c, mu), half);
+  const V from_upper = x.upper - smaller<V>(central_gap(high, c, mu), half);
+  const V both = low >= high ? from_lower : from_upper;
+  const V s = x.where_lower(x.where_upper(both, from_lower), x.where_upper(from_upper, y));
+  const V zl = x.where_lower(mu / larger<V>(s - x.lower, x.gap), x.zero);
+  const V zu = x.where_upper(mu / larger<V>(x.upper - s, x.gap), x.zero);
+  write(out.s + i, s);
+  write(out.zl + i, zl);
+  write(out.zu + i, zu);
+  force = zu - zl;
+  return s;
 }
 
-// A slack, and the multipliers with which its products z gap are mu.
-inline void set_central(const Slacks& at, std::size_t i, double s, double mu,
-                        const Direction& out) {
-  out.s[i] = s;
-  out.zl[i] = at.has_lower(i) ? mu / std::max(s - at.lower[i], least_gap) : 0.0;
-  out.zu[i] = at.has_upper(i) ? mu / std::max(at.upper[i] - s, least_gap) : 0.0;
+void recenter(const Slacks& at, double c, double mu, const Direction& out) {
+  over(at.count, [&](std::size_t i, const auto& kind) {
+    const Some x(at, i, kind);
+    const auto weight = all_lanes(c, kind);
+    const auto low = x.zl - c * (x.s - x.lower), high = x.zu - c * (x.upper - x.s);
+    auto force = x.zero;
+    set_central(x, i, x.s, low, high, weight, mu, out, force);
+  });
 }
 
-// The point of the central path with mu that belongs to slacks and multipliers of another one.
-inline void recenter(const Slacks& at, double c, double mu, const Direction& out) {
-  for (std::size_t i = 0; i < at.count; ++i) {
-    const double low = at.zl[i] - c * (at.s[i] - at.lower[i]);
-    const double high = at.zu[i] - c * (at.upper[i] - at.s[i]);
-    set_central(at, i, central_slack(at, i, at.s[i], low, high, c, mu), mu, out);
-  }
+Misses follow(const Slacks& at, const double* weights, const double* y, const double* dy,
+              const double* y_new, double mu, double next_mu, double least, const Direction& out) {
+  Reduced outside(-infinity), work(0.0);
+  over(at.count, [&](std::size_t i, const auto& kind) {
+    const Some x(at, i, kind);
+    const auto next = read(y_new + i, kind), floor = all_lanes(least, kind);
+    const auto below = 1.0 / x.below, above = 1.0 / x.above;
+    const auto ds = read(dy + i, kind) + read(y + i, kind) - x.s;
+    const auto c = root(larger(x.zl * below + x.zu * above, floor) * least);
+    const auto zl = (mu - x.zl * ds) * below, zu = (mu + x.zu * ds) * above;
+    auto force = x.zero;
+    const auto s = set_central(x, i, next, zl - c * (next - x.lower), zu - c * (x.upper - next), c,
+                               next_mu, out, force);
+    const auto freed = larger(-zl, x.zero) + larger(-zu, x.zero);
+    const auto miss = magnitude(force) * magnitude(next - s);
+    work.of(kind) += read(weights + i, kind) * (miss + released * freed);
+    const auto beyond = larger(x.lower - next, next - x.upper);
+    outside.of(kind) = larger(outside.of(kind), beyond);
+  });
+  return {outside.largest(), work.total()};
 }
 
-// How far outputs are outside their bounds at most, and sum w |zu - zl| |y - s| plus what bounds
-// that no longer hold the solution may give: the negative multipliers, times w and a distance.
-struct Misses {
-  double outside = -infinity, work = 0.0;
-};
+constexpr Kernels kernels{condense, shift, aim,  mean_product, largest_miss, correct,
+                          center,   merit, move, recenter,     follow};
 
-// After a Newton step dy of the outputs y, to y_new, from a point of the central path with mu: the
-// point with the next mu. Multipliers are those that the step predicts, gaps those of y_new, and
-// what both say of a bound is weighed with c, the geometric mean of the ratio of multiplier and gap
-// before and of the least one. With the ratio alone bounds would be released slowly, with the least
-// one found slowly.
-inline Misses follow(const Slacks& at, const double* weights, const double* y, const double* dy,
-                     const double* y_new, double mu, double next_mu, double least,
-                     const Direction& out) {
-  Misses misses;
-  for (std::size_t i = 0; i < at.count; ++i) {
-    const double below = at.below(i), above = at.above(i), ds = dy[i] + y[i] - at.s[i];
-    const double ratio = at.zl[i] / below + at.zu[i] / above;
-    const double c = std::sqrt(std::max(ratio, least) * least);
-    const double zl = (mu - at.zl[i] * ds) / below, zu = (mu + at.zu[i] * ds) / above;
-    const double low = zl - c * (y_new[i] - at.lower[i]), high = zu - c * (at.upper[i] - y_new[i]);
-    const double s = central_slack(at, i, y_new[i], low, high, c, next_mu);
-    set_central(at, i, s, next_mu, out);
-    const double miss = std::abs(out.zu[i] - out.zl[i]) * std::abs(y_new[i] - s);
-    misses.work += weights[i] * (miss + released * (std::max(-zl, 0.0) + std::max(-zu, 0.0)));
-    misses.outside =
-        std::max({misses.outside, at.lower[i] - y_new[i], y_new[i] - at.upper[i]});
-  }
-  return misses;
-}
-
+}  // namespace
 }  // namespace hovi::barrier

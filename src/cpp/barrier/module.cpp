@@ -4,16 +4,20 @@
 
 #include <tuple>
 
-#include "barrier.hpp"
+#include "kernels.hpp"
 #include "simd/arrays.hpp"
+#include "simd/dispatch.hpp"
 
 namespace nb = nanobind;
 using namespace nb::literals;
 using namespace hovi::arrays;
 using hovi::barrier::Direction;
+using hovi::barrier::Kernels;
 using hovi::barrier::Slacks;
 
 namespace {
+
+const Kernels& kernels() { return hovi::choose_kernels<Kernels>(); }
 
 using Vector = Input<1>;
 using Out = Output<1>;
@@ -59,7 +63,7 @@ void condense(const Vector& lower, const Vector& upper, const Vector& s, const V
               const Out& force) {
   const Slacks at = slacks_of(lower, upper, s, zl, zu);
   const std::size_t R = at.count;
-  hovi::barrier::condense(at, vector("y", R, y), mu, vector("sigma", R, sigma),
+  kernels().condense(at, vector("y", R, y), mu, vector("sigma", R, sigma),
                           vector("rho", R, rho), vector("force", R, force));
 }
 
@@ -68,7 +72,7 @@ void shift(const Vector& lower, const Vector& upper, const Vector& s, const Vect
            const Out& out) {
   const Slacks at = slacks_of(lower, upper, s, zl, zu);
   const std::size_t R = at.count;
-  hovi::barrier::shift(at, mu, vector("lower_targets", R, lower_targets),
+  kernels().shift(at, mu, vector("lower_targets", R, lower_targets),
                        vector("upper_targets", R, upper_targets), vector("out", R, out));
 }
 
@@ -79,7 +83,7 @@ std::tuple<double, double, double, double> aim(
   require_share(keep);
   const Slacks at = slacks_of(lower, upper, s, zl, zu);
   const std::size_t R = at.count;
-  const auto lengths = hovi::barrier::aim(
+  const auto lengths = kernels().aim(
       at, vector("y", R, y), vector("dy", R, dy), vector("lower_targets", R, lower_targets),
       vector("upper_targets", R, upper_targets), matched, keep, direction_of(R, ds, dzl, dzu));
   return {lengths.primal, lengths.dual, lengths.largest_force, lengths.largest_residual};
@@ -89,12 +93,12 @@ double mean_product(const Vector& lower, const Vector& upper, const Vector& s, c
                     const Vector& zu, const Out& ds, const Out& dzl, const Out& dzu, double primal,
                     double dual) {
   const Slacks at = slacks_of(lower, upper, s, zl, zu);
-  return hovi::barrier::mean_product(at, direction_of(at.count, ds, dzl, dzu), primal, dual);
+  return kernels().mean_product(at, direction_of(at.count, ds, dzl, dzu), primal, dual);
 }
 
 double largest_miss(const Vector& lower, const Vector& upper, const Vector& s, const Vector& zl,
                     const Vector& zu, double mu) {
-  return hovi::barrier::largest_miss(slacks_of(lower, upper, s, zl, zu), mu);
+  return kernels().largest_miss(slacks_of(lower, upper, s, zl, zu), mu);
 }
 
 void correct(const Vector& lower, const Vector& upper, const Vector& s, const Vector& zl,
@@ -102,7 +106,7 @@ void correct(const Vector& lower, const Vector& upper, const Vector& s, const Ve
              double mu, double matched, const Out& lower_targets, const Out& upper_targets) {
   const Slacks at = slacks_of(lower, upper, s, zl, zu);
   const std::size_t R = at.count;
-  hovi::barrier::correct(at, vector("y", R, y), direction_of(R, ds, dzl, dzu), mu, matched,
+  kernels().correct(at, vector("y", R, y), direction_of(R, ds, dzl, dzu), mu, matched,
                          vector("lower_targets", R, lower_targets),
                          vector("upper_targets", R, upper_targets));
 }
@@ -113,7 +117,7 @@ void center(const Vector& lower, const Vector& upper, const Vector& s, const Vec
             const Out& upper_targets) {
   const Slacks at = slacks_of(lower, upper, s, zl, zu);
   const std::size_t R = at.count;
-  hovi::barrier::center(at, vector("y", R, y), direction_of(R, ds, dzl, dzu), primal, dual, mu,
+  kernels().center(at, vector("y", R, y), direction_of(R, ds, dzl, dzu), primal, dual, mu,
                         matched, vector("lower_targets", R, lower_targets),
                         vector("upper_targets", R, upper_targets));
 }
@@ -124,7 +128,7 @@ double merit(const Vector& lower, const Vector& upper, const Vector& s, const Ve
   require_share(keep);
   const Slacks at = slacks_of(lower, upper, s, zl, zu);
   const std::size_t R = at.count;
-  return hovi::barrier::merit(at, vector("weights", R, weights), vector("y", R, y),
+  return kernels().merit(at, vector("weights", R, weights), vector("y", R, y),
                               vector("dy", R, dy), vector("ds", R, ds), share, keep, mu, penalty);
 }
 
@@ -137,7 +141,7 @@ void move(const Vector& lower, const Vector& upper, const Vector& s, const Vecto
   const Slacks at = slacks_of(lower, upper, s, zl, zu);
   const std::size_t R = at.count;
   const Direction out = new_slacks_of(R, new_s, new_zl, new_zu);
-  hovi::barrier::move(at, vector("y", R, y), direction_of(R, ds, dzl, dzu), primal, dual, keep, mu,
+  kernels().move(at, vector("y", R, y), direction_of(R, ds, dzl, dzu), primal, dual, keep, mu,
                       penalty, ratio, out);
 }
 
@@ -152,7 +156,7 @@ void recenter(const Vector& lower, const Vector& upper, const Vector& s, const V
   const Slacks at = slacks_of(lower, upper, s, zl, zu);
   const std::size_t R = at.count;
   const Direction out = new_slacks_of(R, new_s, new_zl, new_zu);
-  hovi::barrier::recenter(at, c, mu, out);
+  kernels().recenter(at, c, mu, out);
 }
 
 std::tuple<double, double> follow(const Vector& lower, const Vector& upper, const Vector& s,
@@ -164,7 +168,7 @@ std::tuple<double, double> follow(const Vector& lower, const Vector& upper, cons
   const Slacks at = slacks_of(lower, upper, s, zl, zu);
   const std::size_t R = at.count;
   const Direction out = new_slacks_of(R, new_s, new_zl, new_zu);
-  const auto misses = hovi::barrier::follow(at, vector("weights", R, weights), vector("y", R, y),
+  const auto misses = kernels().follow(at, vector("weights", R, weights), vector("y", R, y),
                                             vector("dy", R, dy), vector("y_new", R, y_new), mu,
                                             next_mu, least, out);
   return {misses.outside, misses.work};

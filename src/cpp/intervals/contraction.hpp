@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "kernels.hpp"
+#include "limited_outputs.hpp"
 #include "simd/pack.hpp"
 
 namespace hovi::intervals {
@@ -170,7 +171,8 @@ void contract(const Contraction& shape, const double* gradient, const double* he
                                    columns_hessian);
 }
 
-constexpr Kernels kernels{workspace_size, contract};
+constexpr Kernels kernels{workspace_size, contract,  push, pull,
+                          push_rows,      pull_rows, add_squares};
 
 }  // namespace
 }  // namespace hovi::intervals

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 
 namespace hovi::intervals {
 
@@ -17,6 +18,21 @@ struct Contraction {
   const double* steps;    // (B)
 };
 
+// K of the numbers (q, v, ..., outputs) at a point, each divided by its range.
+struct Selection {
+  std::size_t count, outputs;   // K and the number of outputs p
+  const std::int64_t* columns;  // (K), below R n + p
+  const double* scales;         // (K), 1 / range
+  const double* jacobian;       // (P, p, R n)
+};
+
+// Rows that are linear in the columns of one interval and joint: y = row . x_(., joint).
+struct LinearRows {
+  std::size_t count, columns, dof;         // E, m, n
+  const std::int64_t *intervals, *joints;  // (E)
+  const double* rows;                      // (E, m)
+};
+
 struct Kernels {
   // Doubles that `contract` works in.
   std::size_t (*workspace_size)(const Contraction& shape);
@@ -27,6 +43,25 @@ struct Kernels {
   // columns_gradient: (B, m, n). columns_hessian: (B, m, m, n, n).
   void (*contract)(const Contraction& shape, const double* gradient, const double* hessian,
                    double* workspace, double* columns_gradient, double* columns_hessian);
+
+  // The change of the selection, (P, K), in a step of the intervals' columns, (B, m, n).
+  // work: R n numbers.
+  void (*push)(const Contraction& shape, const Selection& of, const double* step, double* work,
+               double* out);
+
+  // Forces on the selection, (P, K), as a covector in the intervals' columns, (B, m, n).
+  // work: R n numbers.
+  void (*pull)(const Contraction& shape, const Selection& of, const double* forces, double* work,
+               double* out);
+
+  // The change of the rows, (E), in a step of the intervals' columns, (N, m, n). work: m numbers.
+  void (*push_rows)(const LinearRows& of, const double* step, double* work, double* out);
+
+  // Add forces on the rows, (E), to a covector in the intervals' columns, (N, m, n). work: as above.
+  void (*pull_rows)(const LinearRows& of, const double* forces, double* work, double* out);
+
+  // Add weights of the rows' squares, (E), to a Hessian, (N, m, m, n, n). work: m^2 numbers.
+  void (*add_squares)(const LinearRows& of, const double* weights, double* work, double* out);
 
   static const Kernels baseline, avx2;
 };

@@ -1,4 +1,6 @@
 // Limited quantities at points and along intervals: changes pushed forward, multipliers pulled back.
+//
+// Everything is in an unnamed namespace: each instruction set has its own (see simd/dispatch.hpp).
 #pragma once
 
 #include <algorithm>
@@ -6,91 +8,97 @@
 #include <cstdint>
 
 #include "kernels.hpp"
+#include "simd/pack.hpp"
 
 namespace hovi::intervals {
+namespace {
 
-// K of the numbers (q, v, ..., outputs) at a point, each divided by its range.
-struct Selection {
-  std::size_t count, outputs;   // K and the number of outputs p
-  const std::int64_t* columns;  // (K), below R n + p
-  const double* scales;         // (K), 1 / range
-  const double* jacobian;       // (P, p, R n)
-};
-
-// table / (1, h, h^2, ...) of a point, (R, m).
-inline void scaled_table(const Contraction& shape, std::size_t k, std::size_t q, double* A) {
-  const std::size_t m = shape.columns, first = shape.own_tables ? k * shape.points : 0;
-  const double* const table = shape.table + (first + q) * shape.rows * m;
-  double power = 1.0;
-  for (std::size_t r = 0; r < shape.rows; ++r, power *= shape.steps[k])
-    for (std::size_t j = 0; j < m; ++j) A[r * m + j] = table[r * m + j] / power;
+inline double dot(const double* x, const double* y, std::size_t count) {
+  const std::size_t whole = count - count % lanes;
+  Pack total = {};
+  for (std::size_t i = 0; i < whole; i += lanes) total += load(x + i) * load(y + i);
+  double rest = sum(total);
+  for (std::size_t i = whole; i < count; ++i) rest += x[i] * y[i];
+  return rest;
 }
 
-// The change of the selection, (P, K), in a step of the intervals' columns, (B, m, n).
-// work: R m + R n numbers.
-inline void push(const Contraction& shape, const Selection& of, const double* step, double* work,
-                 double* out) {
+// y += factor x.
+inline void add_multiple(double factor, const double* x, std::size_t count, double* y) {
+  const std::size_t whole = count - count % lanes;
+  const Pack factors = broadcast(factor);
+  for (std::size_t i = 0; i < whole; i += lanes)
+    store(y + i, load(y + i) + factors * load(x + i));
+  for (std::size_t i = whole; i < count; ++i) y[i] += factor * x[i];
+}
+
+// 1, 1/h, 1/h^2, ...
+inline void inverse_powers(double h, std::size_t rows, double* powers) {
+  double power = 1.0;
+  for (std::size_t r = 0; r < rows; ++r, power *= h) powers[r] = 1.0 / power;
+}
+
+// The table of a point, (R, m).
+inline const double* table_of(const Contraction& shape, std::size_t k, std::size_t q) {
+  const std::size_t first = shape.own_tables ? k * shape.points : 0;
+  return shape.table + (first + q) * shape.rows * shape.columns;
+}
+
+// work: R n numbers.
+void push(const Contraction& shape, const Selection& of, const double* step, double* work,
+          double* out) {
   const std::size_t R = shape.rows, m = shape.columns, n = shape.dof, size = R * n;
-  double *const A = work, *const dx = work + R * m;
+  double powers[most_rows];
   const double* J = of.jacobian;
-  for (std::size_t k = 0; k < shape.intervals; ++k, step += m * n)
+  for (std::size_t k = 0; k < shape.intervals; ++k, step += m * n) {
+    inverse_powers(shape.steps[k], R, powers);
     for (std::size_t q = 0; q < shape.points; ++q, out += of.count, J += of.outputs * size) {
-      scaled_table(shape, k, q, A);
-      std::fill_n(dx, size, 0.0);
+      const double* const table = table_of(shape, k, q);
+      std::fill_n(work, size, 0.0);
       for (std::size_t r = 0; r < R; ++r)
         for (std::size_t j = 0; j < m; ++j)
-          for (std::size_t a = 0; a < n; ++a) dx[r * n + a] += A[r * m + j] * step[j * n + a];
+          add_multiple(table[r * m + j] * powers[r], step + j * n, n, work + r * n);
       for (std::size_t c = 0; c < of.count; ++c) {
-        const std::size_t column = of.columns[c];
-        double change = column < size ? dx[column] : 0.0;
-        if (column >= size) {
-          const double* const row = J + (column - size) * size;
-          for (std::size_t i = 0; i < size; ++i) change += row[i] * dx[i];
-        }
+        const auto column = std::size_t(of.columns[c]);
+        const double change =
+            column < size ? work[column] : dot(J + (column - size) * size, work, size);
         out[c] = of.scales[c] * change;
       }
     }
+  }
 }
 
-// Forces on the selection, (P, K), as a covector in the intervals' columns, (B, m, n).
-inline void pull(const Contraction& shape, const Selection& of, const double* forces, double* work,
-                 double* out) {
+// work: R n numbers.
+void pull(const Contraction& shape, const Selection& of, const double* forces, double* work,
+          double* out) {
   const std::size_t R = shape.rows, m = shape.columns, n = shape.dof, size = R * n;
-  double *const A = work, *const g = work + R * m;
+  double powers[most_rows];
   const double* J = of.jacobian;
   std::fill_n(out, shape.intervals * m * n, 0.0);
-  for (std::size_t k = 0; k < shape.intervals; ++k, out += m * n)
+  for (std::size_t k = 0; k < shape.intervals; ++k, out += m * n) {
+    inverse_powers(shape.steps[k], R, powers);
     for (std::size_t q = 0; q < shape.points; ++q, forces += of.count, J += of.outputs * size) {
       const std::size_t weight = shape.own_tables ? k * shape.points + q : q;
       const double share = shape.steps[k] * shape.weights[weight];
-      scaled_table(shape, k, q, A);
-      std::fill_n(g, size, 0.0);
+      const double* const table = table_of(shape, k, q);
+      std::fill_n(work, size, 0.0);
       for (std::size_t c = 0; c < of.count; ++c) {
-        const std::size_t column = of.columns[c];
+        const auto column = std::size_t(of.columns[c]);
         const double force = share * of.scales[c] * forces[c];
-        if (column < size) {
-          g[column] += force;
-          continue;
-        }
-        const double* const row = J + (column - size) * size;
-        for (std::size_t i = 0; i < size; ++i) g[i] += force * row[i];
+        if (column < size)
+          work[column] += force;
+        else
+          add_multiple(force, J + (column - size) * size, size, work);
       }
       for (std::size_t r = 0; r < R; ++r)
         for (std::size_t j = 0; j < m; ++j)
-          for (std::size_t a = 0; a < n; ++a) out[j * n + a] += A[r * m + j] * g[r * n + a];
+          add_multiple(table[r * m + j] * powers[r], work + r * n, n, out + j * n);
     }
+  }
 }
-
-// Rows that are linear in the columns of one interval and joint: y = row . x_(., joint).
-struct LinearRows {
-  std::size_t count, columns, dof;            // E, m, n
-  const std::int64_t *intervals, *joints;     // (E)
-  const double* rows;                         // (E, m)
-};
 
 // Calls work(first, last) for every run of rows in one interval and of one joint.
 template <typename Work>
-void in_runs(const LinearRows& of, const Work& work) {
+inline void in_runs(const LinearRows& of, const Work& work) {
   for (std::size_t first = 0, last = 0; first < of.count; first = last) {
     for (last = first + 1; last < of.count && of.intervals[last] == of.intervals[first] &&
                            of.joints[last] == of.joints[first];)
@@ -99,48 +107,80 @@ void in_runs(const LinearRows& of, const Work& work) {
   }
 }
 
-// The change of the rows, (E), in a step of the intervals' columns, (N, m, n). work: m numbers.
-inline void push_rows(const LinearRows& of, const double* step, double* work, double* out) {
-  const std::size_t m = of.columns, n = of.dof;
+// m numbers, as many as a template names if it does: loops over them are unrolled then.
+constexpr std::size_t least_columns = 4, most_columns = 12, any_columns = 0;
+
+template <std::size_t known>
+inline std::size_t columns_of(const LinearRows& of) {
+  return known == any_columns ? of.columns : known;
+}
+
+template <std::size_t known>
+void push_rows_of(const LinearRows& of, const double* step, double* work, double* out) {
+  const std::size_t m = columns_of<known>(of), n = of.dof;
   in_runs(of, [&](std::size_t first, std::size_t last) {
     const double* const x = step + of.intervals[first] * m * n + of.joints[first];
     for (std::size_t j = 0; j < m; ++j) work[j] = x[j * n];
-    for (std::size_t e = first; e < last; ++e) {
-      double change = 0.0;
-      for (std::size_t j = 0; j < m; ++j) change += of.rows[e * m + j] * work[j];
-      out[e] = change;
-    }
+    for (std::size_t e = first; e < last; ++e) out[e] = dot(of.rows + e * m, work, m);
   });
 }
 
-// Add forces on the rows, (E), to a covector in the intervals' columns, (N, m, n). work: m numbers.
-inline void pull_rows(const LinearRows& of, const double* forces, double* work, double* out) {
-  const std::size_t m = of.columns, n = of.dof;
+template <std::size_t known>
+void pull_rows_of(const LinearRows& of, const double* forces, double* work, double* out) {
+  const std::size_t m = columns_of<known>(of), n = of.dof;
   in_runs(of, [&](std::size_t first, std::size_t last) {
     std::fill_n(work, m, 0.0);
-    for (std::size_t e = first; e < last; ++e)
-      for (std::size_t j = 0; j < m; ++j) work[j] += forces[e] * of.rows[e * m + j];
+    for (std::size_t e = first; e < last; ++e) add_multiple(forces[e], of.rows + e * m, m, work);
     double* const g = out + of.intervals[first] * m * n + of.joints[first];
     for (std::size_t j = 0; j < m; ++j) g[j * n] += work[j];
   });
 }
 
-// Add weights of the rows' squares, (E), to a Hessian, (N, m, m, n, n). work: m^2 numbers.
-inline void add_squares(const LinearRows& of, const double* weights, double* work, double* out) {
-  const std::size_t m = of.columns, n = of.dof;
+template <std::size_t known>
+void add_squares_of(const LinearRows& of, const double* weights, double* work, double* out) {
+  const std::size_t m = columns_of<known>(of), n = of.dof;
   in_runs(of, [&](std::size_t first, std::size_t last) {
     std::fill_n(work, m * m, 0.0);
     for (std::size_t e = first; e < last; ++e) {
       const double* const row = of.rows + e * m;
-      for (std::size_t i = 0; i < m; ++i) {
-        const double weighted = weights[e] * row[i];
-        for (std::size_t j = 0; j < m; ++j) work[i * m + j] += weighted * row[j];
-      }
+      for (std::size_t i = 0; i < m; ++i) add_multiple(weights[e] * row[i], row, m, work + i * m);
     }
-    double* const block =
-        out + of.intervals[first] * m * m * n * n + of.joints[first] * (n + 1);
+    double* const block = out + of.intervals[first] * m * m * n * n + of.joints[first] * (n + 1);
     for (std::size_t i = 0; i < m * m; ++i) block[i * n * n] += work[i];
   });
 }
 
+using OfRows = void (*)(const LinearRows&, const double*, double*, double*);
+
+// The function of a table for as many columns as rows have: the first of it is for any number.
+inline OfRows for_columns(const OfRows* functions, std::size_t m) {
+  const bool known = m >= least_columns && m <= most_columns;
+  return functions[known ? m - least_columns + 1 : 0];
+}
+
+void push_rows(const LinearRows& of, const double* step, double* work, double* out) {
+  constexpr OfRows functions[] = {
+      push_rows_of<any_columns>, push_rows_of<4>, push_rows_of<5>,  push_rows_of<6>,
+      push_rows_of<7>,           push_rows_of<8>, push_rows_of<9>,  push_rows_of<10>,
+      push_rows_of<11>,          push_rows_of<12>};
+  for_columns(functions, of.columns)(of, step, work, out);
+}
+
+void pull_rows(const LinearRows& of, const double* forces, double* work, double* out) {
+  constexpr OfRows functions[] = {
+      pull_rows_of<any_columns>, pull_rows_of<4>, pull_rows_of<5>,  pull_rows_of<6>,
+      pull_rows_of<7>,           pull_rows_of<8>, pull_rows_of<9>,  pull_rows_of<10>,
+      pull_rows_of<11>,          pull_rows_of<12>};
+  for_columns(functions, of.columns)(of, forces, work, out);
+}
+
+void add_squares(const LinearRows& of, const double* weights, double* work, double* out) {
+  constexpr OfRows functions[] = {
+      add_squares_of<any_columns>, add_squares_of<4>, add_squares_of<5>,  add_squares_of<6>,
+      add_squares_of<7>,           add_squares_of<8>, add_squares_of<9>,  add_squares_of<10>,
+      add_squares_of<11>,          add_squares_of<12>};
+  for_columns(functions, of.columns)(of, weights, work, out);
+}
+
+}  // namespace
 }  // namespace hovi::intervals

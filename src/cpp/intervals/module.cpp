@@ -7,7 +7,6 @@
 #include <string>
 
 #include "kernels.hpp"
-#include "limited_outputs.hpp"
 #include "paths.hpp"
 #include "prefix_sums.hpp"
 #include "simd/arrays.hpp"
@@ -26,7 +25,7 @@ using hovi::intervals::Selection;
 
 namespace {
 
-const Kernels& kernels(bool portable) { return hovi::choose_kernels<Kernels>(portable); }
+const Kernels& kernels(bool portable = false) { return hovi::choose_kernels<Kernels>(portable); }
 
 // N intervals, as many as z has. q has n numbers at a node; it is checked where it is used.
 IntervalPath path_of(const Input<2>& v, const Input<3>& z, const Input<3>& inner) {
@@ -110,8 +109,8 @@ void push(const Input<3>& table, const Input<1>& weights, const Input<1>& steps,
   step.require("step", {shape.intervals, shape.columns, n});
   out.require("out", {shape.intervals * shape.points, of.count});
   const nb::gil_scoped_release released;
-  const auto work = allocate(shape.rows * (shape.columns + n));
-  hovi::intervals::push(shape, of, step.data(), work.get(), out.data());
+  const auto work = allocate(shape.rows * n);
+  kernels().push(shape, of, step.data(), work.get(), out.data());
 }
 
 void pull(const Input<3>& table, const Input<1>& weights, const Input<1>& steps,
@@ -125,8 +124,8 @@ void pull(const Input<3>& table, const Input<1>& weights, const Input<1>& steps,
   forces.require("forces", {shape.intervals * shape.points, of.count});
   out.require("out", {shape.intervals, shape.columns, n});
   const nb::gil_scoped_release released;
-  const auto work = allocate(shape.rows * (shape.columns + n));
-  hovi::intervals::pull(shape, of, forces.data(), work.get(), out.data());
+  const auto work = allocate(shape.rows * n);
+  kernels().pull(shape, of, forces.data(), work.get(), out.data());
 }
 
 LinearRows rows_of(const Index& intervals, const Index& joints, const Input<2>& rows,
@@ -151,7 +150,7 @@ void push_rows(const Index& intervals, const Index& joints, const Input<2>& rows
       rows_of(intervals, joints, rows, step.shape(0), step.shape(1), step.shape(2));
   out.require("out", {of.count});
   const auto work = allocate(of.columns);
-  hovi::intervals::push_rows(of, step.data(), work.get(), out.data());
+  kernels().push_rows(of, step.data(), work.get(), out.data());
 }
 
 void pull_rows(const Index& intervals, const Index& joints, const Input<2>& rows,
@@ -161,7 +160,7 @@ void pull_rows(const Index& intervals, const Index& joints, const Input<2>& rows
       rows_of(intervals, joints, rows, sums.shape(0), sums.shape(1), sums.shape(2));
   forces.require("forces", {of.count});
   const auto work = allocate(of.columns);
-  hovi::intervals::pull_rows(of, forces.data(), work.get(), sums.data());
+  kernels().pull_rows(of, forces.data(), work.get(), sums.data());
 }
 
 void add_squares(const Index& intervals, const Index& joints, const Input<2>& rows,
@@ -172,7 +171,7 @@ void add_squares(const Index& intervals, const Index& joints, const Input<2>& ro
   const LinearRows of = rows_of(intervals, joints, rows, N, m, n);
   weights.require("weights", {of.count});
   const auto work = allocate(of.columns * of.columns);
-  hovi::intervals::add_squares(of, weights.data(), work.get(), sums.data());
+  kernels().add_squares(of, weights.data(), work.get(), sums.data());
 }
 
 void interpolate(const Input<3>& table, const Input<1>& steps, const Index& intervals,

@@ -40,6 +40,7 @@ class BoundedStep:
     along: the whole direction. share: of it that is taken. mu: at which it aims.
     decrease: predicted decrease of the merit function.
     remaining: decrease that the whole direction predicts for the objective with its barrier.
+    barrier, before: with that mu, and its merit at the point where the step begins.
     reaction: change of the multipliers of equations in the whole step; None without any.
     """
 
@@ -49,6 +50,8 @@ class BoundedStep:
     mu: float
     decrease: float
     remaining: float
+    barrier: Barrier
+    before: float
     reaction: Array | None = None
 
 
@@ -175,7 +178,9 @@ class BoundedSteps(Generic[X]):
             share, predicted = shorter * longest, other
         trial = trial._replace(step=s, norm=math.sqrt(max(norm2, 0.0)))
         change = None if reaction is None else reaction[0]
-        return BoundedStep(trial, along, share, barrier.mu, predicted, 0.5 * whole, change)
+        return BoundedStep(
+            trial, along, share, barrier.mu, predicted, 0.5 * whole, barrier, before, change
+        )
 
     def scale(self) -> float:
         """Magnitude of the objective, to which decreases are relative; positive."""

@@ -72,6 +72,12 @@ ALIKE, MOST_GROWTH = 0.05, 4.0
 second of these, if the objective reopens; others begin with a radius that is wide enough."""
 SHORT_SHARE = 0.1
 """Share of a step at the radius below which it was too long for the bounds that cut it."""
+CUT_SHARE, MOST_CUT, RAISED = 0.5, 4, 10.0
+"""Share below which the bounds cut a step of a model that is not convex, how many such steps, or
+ones of less than SHORT_SHARE, follow each other before the barrier parameter rises, and by how
+much: it has fallen too early, and steps along the bounds would stay short."""
+LEAST_RAISED_GAP = 1e-9
+"""Least distance of slacks from their bounds then, relative to the range."""
 MATCHED = 1e-4
 """Largest |y - s| at which the radius follows such steps."""
 CUT_RADIUS = 10.0
@@ -154,6 +160,7 @@ class _Iteration(BoundedSteps[X]):
         self.refinements = self.reopenings = 0
         self.marks = outcome.marks
         self.marked = 0.0
+        self.cut = 0
 
     def run(self) -> None:
         """Iterate until stationary, or until a limit is reached."""
@@ -183,7 +190,7 @@ class _Iteration(BoundedSteps[X]):
 
     def _try(self, step: BoundedStep, model: QuadraticModel) -> bool:
         outcome, trial, along = self.outcome, step.trial, step.along
-        barrier = outcome.barrier.with_mu(step.mu)
+        barrier = step.barrier
         moved_step = step.share * trial.step
         x = self.objective.retract(outcome.x, moved_step, model)
         before = outcome.outputs.value + self._hold(step.reaction, 1.0)
@@ -192,7 +199,7 @@ class _Iteration(BoundedSteps[X]):
         except BaseException:  # the multipliers stay those of the current point
             self._hold(step.reaction, -1.0)
             raise
-        old = before + barrier.merit(outcome.outputs.y, self.penalty, along, 0.0)
+        old = before + step.before
         new, moved = math.inf, barrier
         if np.isfinite(outputs.value):
             moved = barrier.moved(outputs.y, along, step.share, self.penalty)
@@ -224,6 +231,7 @@ class _Iteration(BoundedSteps[X]):
         outcome.keep_best(self.objective.bounds)
         if self.cautious:
             self._reduce_mu(step)
+        self._raise_mu(step)
         self.cautious = self.plain
         self.product = outcome.barrier.mean_product()
         self.violations.append(float(outcome.violation.max(initial=0.0)))
@@ -315,6 +323,21 @@ class _Iteration(BoundedSteps[X]):
             mu = max(last, min(0.1 * barrier.mu, self.density * share**1.5))
             outcome.barrier = barrier.with_mu(mu)
             self.penalty = 0.0
+
+    def _raise_mu(self, step: BoundedStep) -> None:
+        """Raise mu where bounds cut one step after another, most of all where curvature is left."""
+        outcome, objective = self.outcome, self.objective
+        cut = step.share < (SHORT_SHARE if step.trial.newton else CUT_SHARE)
+        self.cut = self.cut + 1 if cut and outcome.feasible and not objective.reopens else 0
+        mu = min(RAISED * max(outcome.barrier.mu, self.product), INITIAL_MU * self.density)
+        if self.cut < MOST_CUT or mu <= outcome.barrier.mu:
+            return
+        bounds, y, scale = objective.bounds, outcome.outputs.y, outcome.barrier.scale
+        outcome.barrier = Barrier.central(bounds, y, mu, scale, LEAST_RAISED_GAP)
+        self.cut, self.penalty = 0, 0.0
+        # points with a smaller one are of the way back, not of the central path
+        self.marks[:] = [mark for mark in self.marks if mark[0] > mu]
+        self.marked = self.marks[-1][0] if self.marks else 0.0
 
     def _refined(self, at_end: bool) -> bool:
         """Whether outputs were replaced by others, which bound less."""

@@ -43,8 +43,8 @@ GAP_WEIGHT = 3.0
 ROOM = 2e-7
 """Distance by which bounds are moved inwards, and outputs may miss them at the end."""
 LARGEST_GROWTH, LEAST_OUTSIDE = 4.0, 3e-4
-"""How far outputs may be outside after a step, relative to how far they were at first, or to the
-least such distance: beyond, it does not converge."""
+"""How far outputs may be outside after a step, relative to how far they were at first from their
+bounds or from the known slacks, or to the least such distance: beyond, it does not converge."""
 
 
 def follow_bounded(
@@ -53,6 +53,7 @@ def follow_bounded(
     known: Barrier,
     options: Options,
     report: Callable[[int, float], None] | None = None,
+    most_outside: float = ROOM,
 ) -> BoundedOutcome[X]:
     """Minimise from a point near the solution, whose slacks and multipliers are nearly known.
 
@@ -60,12 +61,14 @@ def follow_bounded(
     known: of the solution of a similar problem with as many outputs.
     options: `barrier` is the last barrier parameter; it ends where the next step predicts, and the
         distance of slacks from outputs means, less than `enough` of the objective.
+    most_outside: how far outputs may be outside of their bounds at the end; with more than a trifle
+        it is the objective alone that is sought, and outputs are not refined.
     """
     outcome = BoundedOutcome(x, objective.outputs(x), known, Stop.DIVERGED)
     if not np.isfinite(outcome.outputs.value):
         return outcome
     with outcome.recorded_end(options.time_limit):
-        _Newton(objective, outcome, options, report).run()
+        _Newton(objective, outcome, options, report, most_outside).run()
     return outcome
 
 
@@ -78,8 +81,9 @@ class _Newton(Generic[X]):
         outcome: BoundedOutcome[X],
         options: Options,
         report: Callable[[int, float], None] | None,
+        most_outside: float,
     ) -> None:
-        self.objective, self.outcome = objective, outcome
+        self.objective, self.outcome, self.most_outside = objective, outcome, most_outside
         self.options, self.report = options, report
         outputs, bounds = outcome.outputs, objective.bounds.shrunk(ROOM)
         known = dataclasses.replace(outcome.barrier, bounds=bounds)
@@ -87,7 +91,8 @@ class _Newton(Generic[X]):
         self.last_mu = options.barrier * self.density
         self.weight = GAP_WEIGHT * self.density
         outside = float(known.outside(outputs.y).max(initial=0.0))
-        self.farthest = LARGEST_GROWTH * max(outside, LEAST_OUTSIDE)
+        apart = float(np.max(np.abs(outputs.y - known.s), initial=0.0))
+        self.farthest = LARGEST_GROWTH * max(outside, LEAST_OUTSIDE, apart)
         mu = min(FIRST_MU * outside**2, LARGEST_FIRST_MU) * self.density
         outcome.barrier = known.recentered(self.weight, max(self.last_mu, mu))
         self.outside, self.work = 0.0, math.inf
@@ -106,7 +111,7 @@ class _Newton(Generic[X]):
                 return
             step, slope, length = model.descend(factor)
             if self._is_solved(-0.5 * slope):
-                if self._refined():
+                if self.most_outside <= ROOM and self._refined():
                     continue
                 barrier = dataclasses.replace(outcome.barrier, bounds=self.objective.bounds)
                 outcome.barrier = barrier.at_outputs(outcome.outputs.y)
@@ -143,7 +148,7 @@ class _Newton(Generic[X]):
         if outcome.iterations == 0 or outcome.barrier.mu > self.last_mu:
             return False
         enough = max(self.options.decrease, self.options.enough) * abs(outcome.outputs.value)
-        return self.outside <= ROOM and max(decrease, self.work) <= enough
+        return self.outside <= self.most_outside and max(decrease, self.work) <= enough
 
     def _refined(self) -> bool:
         """Whether outputs were replaced by others."""

@@ -213,7 +213,8 @@ class NoCost(Lagrangian):
 
 def add_weights(hessian: Array, terms: PointTerms, nv: int) -> None:
     """Add the contributions of limits on the jet to its Hessian, in place."""
-    diagonal = np.arange(hessian.shape[1])
-    hessian[:, diagonal, diagonal] += terms.jet_weight
+    if terms.jet_weight.any():
+        diagonal = np.arange(hessian.shape[1])
+        hessian[:, diagonal, diagonal] += terms.jet_weight
     if terms.configuration_weight is not None:
         hessian[:, :nv, :nv] += terms.configuration_weight

@@ -7,7 +7,7 @@ the least and the largest of them; halving the part brings them four times neare
 
 from __future__ import annotations
 
-from functools import cache
+from functools import cache, lru_cache
 from math import comb
 
 import numpy as np
@@ -16,6 +16,9 @@ import numpy.typing as npt
 from hovi.schemes.interval_curve import jet_rows
 
 Array = npt.NDArray[np.float64]
+
+MOST_PARTS = 4096
+"""Number of parts whose rows are kept; most motions have the same few."""
 
 
 def control_degree(k: int, inner_modes: int, derivative: int) -> int:
@@ -49,11 +52,18 @@ def control_rows(
     Returns rows over (h q0', ..., h^(k-1) q0^(k-1), Z, c), (L, d + 1, 2 k - 1 + r), and with them
     those of the curve at the positions of the control points, left + width i / d.
     """
+    parts = zip(left.tolist(), width.tolist(), strict=True)
+    found = [_of_part(*part, k, inner_modes, derivative) for part in parts]
+    points, beside = (np.stack(each) for each in zip(*found, strict=True))
+    return points, beside
+
+
+@lru_cache(maxsize=MOST_PARTS)
+def _of_part(
+    left: float, width: float, k: int, inner_modes: int, derivative: int
+) -> tuple[Array, Array]:
+    """As `control_rows`, of one part: (d + 1, 2 k - 1 + r) each."""
     d = control_degree(k, inner_modes, derivative)
-    nodes = (left[:, None] + width[:, None] * control_nodes(d)).ravel()
-    beside = (left[:, None] + width[:, None] * np.linspace(0.0, 1.0, d + 1)).ravel()
-    at_nodes, at_points = (
-        jet_rows(s, k, inner_modes)[:, derivative].reshape(len(left), d + 1, -1)
-        for s in (nodes, beside)
-    )
-    return np.asarray(np.matmul(control_matrix(d), at_nodes)), at_points
+    nodes, beside = left + width * control_nodes(d), left + width * np.linspace(0.0, 1.0, d + 1)
+    at_nodes, at_points = (jet_rows(s, k, inner_modes)[:, derivative] for s in (nodes, beside))
+    return np.asarray(control_matrix(d) @ at_nodes), np.asarray(at_points)

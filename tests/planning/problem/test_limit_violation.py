@@ -12,7 +12,12 @@ from hovi.discrete.grid import Grid
 from hovi.discrete.guess import path_on_grid
 from hovi.discrete.state import State
 from hovi.discrete.trajectory import Trajectory
-from hovi.planning.problem.limit_violation import closeness, excess_along, worst_sentence
+from hovi.planning.problem.limit_violation import (
+    closeness,
+    excess_along,
+    excess_of,
+    worst_sentence,
+)
 from hovi.planning.problem.limits import as_limits
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.search.planner import plan
@@ -146,3 +151,21 @@ def test_extremes_next_to_the_ends_of_a_polynomial_of_high_degree_are_found(
     for tilt in np.linspace(-0.004, 0.004, 9):
         line = tilt * np.polynomial.Chebyshev([-(2 * at - 1), 1.0], domain=[0, 1])
         _require_the_highest(0.95 + 0.05 * T + 4e-5 + line, arm_scene, two_link)
+
+
+@pytest.mark.parametrize("tau", [0.6, 0.95, 0.999, 1.1])
+def test_excess_of_chosen_outputs_is_that_of_all_where_a_bound_may_be_exceeded(
+    motion: Trajectory, two_link: Robot, tau: float
+) -> None:
+    peak = np.abs(motion.sample(np.linspace(0.0, motion.duration, 5001)).tau).max(axis=0)
+    limits = as_limits(two_link, LIMITS | {"tau": (tau * peak).tolist()})
+    chosen = np.zeros(limits.bounded.shape, dtype=bool)
+    chosen[3] = True
+    whole, (lower, upper) = excess_along(motion, limits), excess_of(motion, limits, chosen)
+    for some, every in ((lower, whole.lower), (upper, whole.upper)):
+        assert (some[:, :3] == -np.inf).all()
+        near = every[:, 3] > -0.02
+        np.testing.assert_array_equal(some[:, 3][near], every[:, 3][near])
+        assert (some[:, 3] <= every[:, 3]).all()
+        assert (some[:, 3][~near] <= -0.02).all()
+    assert (max(lower.max(), upper.max()) > 0.0) == (tau < 1.0)

@@ -29,6 +29,10 @@ BATCH = 128
 REFINEMENT_SHARE = 0.05
 """The largest extreme of an output in an interval is refined if it is closer than this to a bound,
 as a share of its range."""
+COARSE = 4, 2
+"""Every which of these samples is looked at first in `excess_of`, with as many modes as in
+COARSE_MODES and with more."""
+COARSE_MODES = 4
 PEAK_SHARE = 2e-3
 """The same for every other local extreme; smaller, as a motion along a bound has many of them."""
 AT_LIMIT = 1e-3
@@ -70,15 +74,56 @@ def excess_along(
     wherever the curvature of the samples allows an excess between them: a motion along a bound has
     several extremes, and the largest one is not always next to the largest sample.
     """
+    every = np.arange(trajectory.grid.intervals)
+    return _excess_in(every, trajectory, limits, limits.bounded & refined)
+
+
+def excess_of(
+    trajectory: Trajectory, limits: Limits, chosen: npt.NDArray[np.bool_]
+) -> tuple[Array, Array]:
+    """The excess over the lower and upper bounds of chosen outputs, (N, kinds, nv) each.
+
+    -inf for others. The same as that of `excess_along` wherever that may be positive. Elsewhere it
+    is that of a few samples, which stay further from their bounds than two neighbors differ.
+    chosen: shape (kinds, nv).
+    """
     raise_if_late()
-    N, shape = trajectory.grid.intervals, limits.lower.shape
-    k, s = np.repeat(np.arange(N), SAMPLES), np.tile(POSITIONS, N)
-    outputs = _outputs(trajectory, k, s, limits).reshape(N, SAMPLES, *shape)
+    N, grid = trajectory.grid.intervals, trajectory.grid
+    found = np.full((2, N, *limits.lower.shape), -np.inf)
+    kinds, joints = np.nonzero(limits.bounded & chosen)
+    if len(kinds) == 0:
+        return found[0], found[1]
+    s = POSITIONS[:: COARSE[int(grid.inner_modes > COARSE_MODES)]]
+    outputs = _outputs(trajectory, np.repeat(np.arange(N), len(s)), np.tile(s, N), limits)
+    y = outputs.reshape(N, len(s), *limits.lower.shape)[:, :, kinds, joints]
+    ranges = limits.ranges[kinds, joints]
+    change = np.abs(np.diff(y, axis=1)).max(axis=1)
+    below, above = (each[:, kinds, joints] for each in limits.on(trajectory.t))
+    sides = np.stack([below - y.min(axis=1), y.max(axis=1) - above]) / ranges
+    safe = sides + change / ranges <= -REFINEMENT_SHARE  # false where it is no number
+    found[:, :, kinds, joints] = sides
+    near = np.flatnonzero(~safe.all(axis=(0, 2)))
+    if len(near) > 0:
+        some = _excess_in(near, trajectory, limits, limits.bounded & chosen)
+        for side, each in zip(found, (some.lower, some.upper), strict=True):
+            side[near[:, None], kinds, joints] = each[:, kinds, joints]
+    return found[0], found[1]
+
+
+def _excess_in(
+    intervals: Index, trajectory: Trajectory, limits: Limits, refined: npt.NDArray[np.bool_]
+) -> Excess:
+    """As `excess_along`, in some intervals."""
+    raise_if_late()
+    N = len(intervals)
+    k, s = np.repeat(intervals, SAMPLES), np.tile(POSITIONS, N)
+    outputs = _outputs(trajectory, k, s, limits).reshape(N, SAMPLES, *limits.lower.shape)
+    chosen = np.nonzero(refined)
     below, above = limits.on(trajectory.t)
-    kinds, joints = np.nonzero(limits.bounded & refined)
-    chosen = kinds, joints
-    lower, at_lower = _Side(trajectory, limits, -1.0, below).extremes(outputs, chosen)
-    upper, at_upper = _Side(trajectory, limits, 1.0, above).extremes(outputs, chosen)
+    sides = _Side(trajectory, limits, -1.0, below), _Side(trajectory, limits, 1.0, above)
+    (lower, at_lower), (upper, at_upper) = (
+        side.extremes(outputs, intervals, chosen) for side in sides
+    )
     return Excess(lower, upper, at_lower, at_upper)
 
 
@@ -94,14 +139,17 @@ class _Side:
     sign: float
     bound: Array
 
-    def extremes(self, outputs: Array, chosen: tuple[Index, Index]) -> tuple[Array, Array]:
+    def extremes(
+        self, outputs: Array, intervals: Index, chosen: tuple[Index, ...]
+    ) -> tuple[Array, Array]:
         """The largest excess in each interval, and its relative position, (N, kinds, nv) each.
 
-        outputs: of all samples, shape (N, SAMPLES, kinds, nv). chosen: kinds and joints that are
-            refined.
+        outputs: of all samples, shape (N, SAMPLES, kinds, nv). intervals: their numbers, (N,).
+        chosen: kinds and joints that are refined.
         """
         raise_if_late()
-        excess = self.sign * (outputs - self.bound[:, None]) / self.limits.ranges
+        bound = self.bound[np.minimum(intervals, len(self.bound) - 1)]
+        excess = self.sign * (outputs - bound[:, None]) / self.limits.ranges
         index = np.argmax(excess, axis=1)
         largest = np.take_along_axis(excess, index[:, None], axis=1)[:, 0]
         s = POSITIONS[index]
@@ -114,7 +162,7 @@ class _Side:
         if len(k) == 0:
             return largest, s
         kind, joint = kinds[column], joints[column]
-        found, at = self.refined(k, sample, kind, joint)
+        found, at = self.refined(intervals[k], sample, kind, joint)
         for row in np.argsort(found):  # the largest of each interval and output comes last
             entry = k[row], kind[row], joint[row]
             if found[row] >= largest[entry]:

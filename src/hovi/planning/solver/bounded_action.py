@@ -98,17 +98,25 @@ class BoundedAction(BoundedObjective[DiscretePath]):
     def outputs(self, x: DiscretePath) -> Outputs:
         """The discrete action, and the bounded outputs relative to their ranges."""
         outputs = self.action.outputs(x)
-        pairs = zip(self.action.jets(x), outputs, strict=True)
-        space = self.lagrangian.space
-        rows = [
-            np.concatenate([q if space is None else space.coordinates(q), *rates, tau], axis=1)
-            for (q, *rates), tau in pairs
-        ]
-        y = self._scaled(np.concatenate(rows))
+        first = self._jet_size
+        if self.columns.min(initial=first) >= first:  # such as torques, while rows bound q, v and a
+            every = outputs[0] if len(outputs) == 1 else np.concatenate(outputs)
+            y = (every[:, self.columns - first] - self._origin) * self._inverse_ranges
+        else:
+            y = self._scaled(self._at_all_points(x, outputs))
         if self.more is not None:
             y = np.concatenate([y, self.more.values(self._configurations(x))], axis=1)
         y = y.ravel() if self.rows is None else np.append(y, self.rows.values(x))
         return Outputs(self.action.value_of(x, outputs), y)
+
+    def _at_all_points(self, x: DiscretePath, outputs: list[Array]) -> Array:
+        """(q, v, ..., outputs) at all points, shape (P, size)."""
+        space = self.lagrangian.space
+        rows = [
+            np.concatenate([q if space is None else space.coordinates(q), *rates, tau], axis=1)
+            for (q, *rates), tau in zip(self.action.jets(x), outputs, strict=True)
+        ]
+        return np.concatenate(rows)
 
     def model(
         self, x: DiscretePath, sigma: Array, rho: Array, multipliers: Array
@@ -189,7 +197,7 @@ class BoundedAction(BoundedObjective[DiscretePath]):
         """First-order change of the bounded outputs, shape (R,)."""
         columns, expansion = model.gather(step), self.action.expansion
         if self.more is None and expansion.charts is None:
-            dy = self._pushed(columns)
+            return self._pushed(columns)
         else:
             changes = self.ld.point_steps(columns, self.action.coordinates, expansion)
             parts = []
@@ -206,13 +214,17 @@ class BoundedAction(BoundedObjective[DiscretePath]):
         return np.append(dy, push_rows(self.rows, self._row_columns, columns))
 
     def _pushed(self, columns: Array) -> Array:
-        """The change at the points, (P, K), compiled."""
-        out = np.empty((self._points, len(self.columns)))
+        """The change at the points, then of the rows, (R,), compiled."""
+        rows, count = self.rows, self._point_count
+        out = np.empty(count + (0 if rows is None else rows.size))
+        at_points = out[:count].reshape(self._points, -1)
         for batch, part, (_, J) in self._batches:
             step = np.ascontiguousarray(columns[batch.index, : self.ld.k * 2 + batch.modes])
             native.push(
-                *self._tables(batch), step, self.columns, self._inverse_ranges, J, out[part]
+                *self._tables(batch), step, self.columns, self._inverse_ranges, J, at_points[part]
             )
+        if rows is not None and rows.size > 0:
+            native.push_rows(rows.intervals, rows.joints, self._row_columns, columns, out[count:])
         return out
 
     def pull(self, forces: Array, model: QuadraticModel) -> Array:
@@ -231,6 +243,9 @@ class BoundedAction(BoundedObjective[DiscretePath]):
                     pulled = expansion.charts[i].nodal_gradient(gradient)
                 else:
                     pulled = batch.contracted(gradient, self.action.coordinates)
+            if pulled.shape == local.shape:  # of all intervals
+                local = pulled
+                continue
             own = np.zeros_like(local[:, : pulled.shape[1]])
             batch.add(pulled, own)
             local[:, : pulled.shape[1]] += own

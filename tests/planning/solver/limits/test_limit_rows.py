@@ -76,7 +76,7 @@ def with_rows(problem: TrajectoryProblem) -> LimitRows:
     """Rows of which some parts are halved once, and some of these again."""
     rows = rows_of(problem)
     for every in (3, 5):
-        rows._halve(np.arange(0, len(rows.parts), every), np.arange(rows.size))
+        rows._halve(np.arange(len(rows.parts)) % every == 0, np.arange(rows.size))
     return rows
 
 

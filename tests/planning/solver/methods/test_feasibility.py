@@ -11,6 +11,7 @@ import pytest
 import hovi
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import Grid
+from hovi.optimize.bounded_objective import BoundedOutcome
 from hovi.optimize.trust_region import Options, Stop
 from hovi.planning.problem.limit_violation import excess_along
 from hovi.planning.problem.limits import as_limits
@@ -84,10 +85,10 @@ def test_a_goal_that_moves_far_is_reached_all_the_same(limited: Solution) -> Non
     assert again.cost == pytest.approx(cold.cost, rel=2e-5)
 
 
-def test_a_solve_nearby_that_takes_long_is_given_up(
+def test_a_solve_nearby_that_takes_long_goes_on_unless_it_is_outside_of_bounds(
     limited: Solution, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Then there is one from the guess, which takes fewer steps than another minimum is away."""
+    """Else there is one from the guess, which takes fewer steps than another minimum is away."""
     begun, whole = [], feasibility._solved_at_all
 
     def counted(*given: Any) -> Any:
@@ -99,6 +100,9 @@ def test_a_solve_nearby_that_takes_long_is_given_up(
     assert not begun
     monkeypatch.setattr(feasibility, "WARM_STEPS", 1)
     assert limited.replan(goal=hovi.State([0.9, 1.1])).success
+    assert not begun
+    monkeypatch.setattr(BoundedOutcome, "feasible", False)
+    limited.replan(goal=hovi.State([0.9, 1.1]))
     assert begun
 
 

@@ -20,6 +20,7 @@ from hovi.planning.search.planner import plan
 from hovi.planning.solver.bounded_action import BoundedAction
 from hovi.planning.solver.solver import Solution, guess_path, solve_on_grid
 from hovi.planning.solver.status import Status
+from hovi.robot.robot import Robot
 from hovi.schemes import galerkin
 from oracles.ipopt_oracle import least_action
 
@@ -217,3 +218,18 @@ def test_a_light_wrist_at_the_iteration_limit_is_refined_to_a_minimum() -> None:
     solution = plan(scene, start, goal, 4.822, continuation=False)
     assert solution.success, solution.message
     assert largest_excess(solution.trajectory, as_limits(robot, "urdf")) <= 1e-6
+
+
+def test_a_barrier_that_fell_too_early_rises_again(ur5: Robot) -> None:
+    """Within small gaps the way out of negative curvature takes four times as many steps."""
+    scene = hovi.Scene(ur5, [hovi.effects.Gravity()])
+    start = State([-1.469, 0.245, -0.36, 2.708, -2.887, 1.458])
+    goal = State([0.719, -2.963, 1.377, -3.041, 1.621, 0.08])
+    ld = DiscreteLagrangian(
+        scene.effort_lagrangian(), Grid.uniform(3.53, 16, galerkin(4, points=10))
+    )
+    problem = TrajectoryProblem(ld, start, goal, as_limits(ur5, {"base": "urdf"}))
+    found = solve_on_grid(problem)
+    assert found.status is Status.MINIMUM
+    assert found.cost == pytest.approx(744.6, rel=1e-3)
+    assert found.nit < 200

@@ -26,12 +26,14 @@ from hovi.optimize.bounded_objective import Refinement
 from hovi.planning.problem.limits import Limits
 from hovi.planning.solver.limits.limited_coordinates import LimitedCoordinates
 from hovi.planning.solver.limits.limited_parts import LimitedParts
+from hovi.planning.solver.limits.row_forces import RowsAtNodes
 from hovi.robot.space.configuration_space import ConfigurationSpace
 from hovi.schemes.control_points import control_degree, control_nodes, control_rows
 from hovi.schemes.scheme import regular_from_nodal
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]
+Mask = npt.NDArray[np.bool_]
 
 WEIGHT = 0.1
 """Weight of a row in a barrier, as a share of the interval."""
@@ -56,7 +58,15 @@ class LimitRows:
     fixed_ends: whether the start and the goal are given, and with them the control points there.
     halvings: of all intervals for the control points of positions, and for those of derivatives.
     barrier: the last barrier parameter, relative to the mean density of the cost.
+
+    bounds: lower and upper ones of the E rows, (E,) each. weights: of the rows in a barrier, (E,),
+    in [s]. at_nodes: see `forces_of`, which keeps it here.
     """
+
+    bounds: tuple[Array, Array]
+    weights: Array
+    at_nodes: list[RowsAtNodes] | None
+    _nodal: Array | None
 
     def __init__(
         self,
@@ -101,6 +111,7 @@ class LimitRows:
         rows = copy.copy(self)
         rows.grid = grid
         powers = (grid.duration / self.grid.duration) ** -self.orders[:, None].astype(float)
+        rows.weights, rows.at_nodes, rows._nodal = rows._share_of_intervals(), None, None
         rows._regular, rows._beyond = self._regular * powers, self._beyond * powers
         return rows
 
@@ -146,19 +157,6 @@ class LimitRows:
         return len(self._rows.part)
 
     @property
-    def bounds(self) -> tuple[Array, Array]:
-        """Lower and upper bounds of the rows, (E,) each."""
-        c = self.coordinate
-        k = np.minimum(self.intervals, len(self.of.lower) - 1)
-        lower, upper = (each[k, c] / self.of.ranges[c] for each in (self.of.lower, self.of.upper))
-        return lower, upper
-
-    @property
-    def weights(self) -> Array:
-        """Weights in a barrier, shape (E,), in [s]."""
-        return np.asarray(WEIGHT * self.grid.steps[self.intervals])
-
-    @property
     def table(self) -> Array:
         """y range h^j, without q0, over (h q0', ..., Z, c) of the interval, (E, 2 k - 1 + r)."""
         return self._rows.table
@@ -173,41 +171,47 @@ class LimitRows:
         """Derivatives of y in the columns of the interval, shape (E, m)."""
         if coordinates == "regular":
             return self._regular
-        nodal = self._regular @ regular_from_nodal(self.grid.inner_modes, self.grid.order)
-        return np.ascontiguousarray(nodal)
+        if self._nodal is None:
+            nodal = self._regular @ regular_from_nodal(self.grid.inner_modes, self.grid.order)
+            self._nodal = np.ascontiguousarray(nodal)
+        return self._nodal
 
     def refine(self, path: DiscretePath, level: float) -> Refinement | None:
         """Halve parts whose control points, away from the curve, raise the cost; None if none do.
 
         level: barrier parameter at the path, relative to the mean density of the cost.
         """
-        numbers, before = np.arange(self.size), self._places
-        for _ in range(0 if self.fixed or self.size == 0 else MAX_HALVINGS):
-            coarse = self._coarse(path, level)
-            if len(coarse) == 0:
-                break
-            numbers = self._halve(coarse, numbers)
-        kept = numbers[numbers >= 0]
-        if len(kept) == len(before):
+        if self.fixed or self.size == 0:
             return None
+        coarse = self._coarse(path, level)
+        if not coarse.any():
+            return None
+        numbers, before = np.arange(self.size), self._places
+        for _ in range(MAX_HALVINGS):
+            numbers = self._halve(coarse, numbers)
+            coarse = self._coarse(path, level)
+            if not coarse.any():
+                break
+        kept = numbers[numbers >= 0]
         return Refinement(kept, self._origins(before, len(kept)))
 
-    def _coarse(self, path: DiscretePath, level: float) -> Index:
-        """The parts that are worth halving."""
+    def _coarse(self, path: DiscretePath, level: float) -> Mask:
+        """Which parts are worth halving, shape (L,)."""
         y, (lower, upper) = self.values(path), self.bounds
         outside = push_rows(self, self._beyond, self._data(path))
         slack = np.maximum(np.where(outside > 0, upper - y, y - lower), 1e-12)
         gap, force = np.abs(outside), level / slack
         loss = self.weights / self.grid.duration * force * gap
-        some = (gap > max(LEAST_GAP, level)) & (loss > LEAST_LOSS)
-        return np.unique(self._rows.part[some & (loss.sum() > self.max_loss)])
+        coarse = np.zeros(len(self.parts), dtype=bool)
+        if loss.sum() > self.max_loss:
+            some = (gap > max(LEAST_GAP, level)) & (loss > LEAST_LOSS)
+            coarse[self._rows.part[some]] = True
+        return coarse
 
-    def _halve(self, coarse: Index, numbers: Index) -> Index:
+    def _halve(self, coarse: Mask, numbers: Index) -> Index:
         """Halve parts; returns the given numbers of the rows that remain, and -1 for the new."""
-        kept = np.flatnonzero(~np.isin(self._rows.part, coarse))
-        remaining = np.setdiff1d(np.arange(len(self.parts)), coarse)
-        places = np.zeros(len(self.parts), dtype=np.intp)
-        places[remaining] = np.arange(len(remaining))
+        kept, remaining = np.flatnonzero(~coarse[self._rows.part]), np.flatnonzero(~coarse)
+        places = np.cumsum(~coarse) - 1
         old, new = self._rows.at(kept), self.parts.at(coarse).halves()
         rows = self._rows_of(new)
         both = old._replace(part=places[old.part]), rows._replace(part=rows.part + len(remaining))
@@ -220,11 +224,18 @@ class LimitRows:
         self._rows = rows
         self.intervals, self.coordinate = self.parts.k[rows.part], self.parts.coordinate[rows.part]
         self.orders, self.joints = self.of.order[self.coordinate], self.of.joint[self.coordinate]
+        self.at_nodes, self._nodal = None, None
         ranges = self.of.ranges[self.coordinate]
+        k = np.minimum(self.intervals, len(self.of.lower) - 1)
+        lower, upper = (each[k, self.coordinate] for each in (self.of.lower, self.of.upper))
+        self.bounds, self.weights = (lower / ranges, upper / ranges), self._share_of_intervals()
         scale = 1.0 / (ranges * self.grid.steps[self.intervals] ** self.orders)[:, None]
         base = np.where(self.orders == 0, 1.0 / ranges, 0.0)[:, None]
         self._regular = np.concatenate([base, rows.table * scale], axis=1)
         self._beyond = (rows.table - rows.beside) * scale
+
+    def _share_of_intervals(self) -> Array:
+        return np.asarray(WEIGHT * self.grid.steps[self.intervals])
 
     def _rows_of(self, parts: LimitedParts) -> _Rows:
         """The rows of parts."""
@@ -241,7 +252,7 @@ class LimitRows:
             found.append(_Rows(own[part], i, table, beside))
         return _Rows(*(np.concatenate(each) for each in zip(*found, strict=True)))
 
-    def _needed(self, parts: LimitedParts, order: int) -> npt.NDArray[np.bool_]:
+    def _needed(self, parts: LimitedParts, order: int) -> Mask:
         """Which control points get rows, shape (L, d + 1): others are given.
 
         One at which two parts meet belongs to the part before, and where an interval has other

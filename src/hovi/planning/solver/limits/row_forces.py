@@ -10,6 +10,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 import numpy.typing as npt
 
+from hovi._native import intervals as native
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import Grid
 from hovi.discrete.instants import Instants
@@ -22,6 +23,9 @@ if TYPE_CHECKING:
     from hovi.planning.solver.limits.limit_rows import LimitRows
 
 Array = npt.NDArray[np.float64]
+Index = npt.NDArray[np.intp]
+RowsAtNodes = tuple[int, Index, Index, Index, Array]
+"""An order of derivatives, and its rows: numbers, intervals, joints, and values at the nodes."""
 
 _AT_INSTANTS: WeakKeyDictionary[DiscreteLagrangian, DiscreteLagrangian] = WeakKeyDictionary()
 """The last discrete Lagrangian with further instants of each one, with what it has computed."""
@@ -41,13 +45,12 @@ def forces_of(
     nodes = control_nodes(control_degree(grid.order, grid.inner_modes, 0))
     slope = np.zeros((grid.intervals, grid.order + 1, nv, len(nodes)))
     forces = rows.weights * multipliers / rows.of.ranges[rows.coordinate]
-    for order in np.unique(rows.orders):
-        own = np.flatnonzero(rows.orders == order)
-        shares = forces[own, None] * _values_in(rows.table[own], grid, int(order))
-        places = rows.intervals[own] * nv + rows.joints[own]
-        numbers = places[:, None] * len(nodes) + np.arange(len(nodes))
-        sums = np.bincount(numbers.ravel(), shares.ravel(), len(slope) * nv * len(nodes))
-        slope[:, order] = sums.reshape(len(slope), nv, len(nodes))
+    if rows.at_nodes is None:
+        rows.at_nodes = _at_nodes(rows)
+    for order, own, intervals, joints, values in rows.at_nodes:
+        sums = np.zeros((grid.intervals, len(nodes), nv))
+        native.pull_rows(intervals, joints, values, forces[own], sums)
+        slope[:, order] = sums.transpose(0, 2, 1)
     instants = rows.instants
     force = slope.transpose(0, 3, 1, 2).reshape(len(instants.weights), -1)
     force = force / instants.weights[:, None]
@@ -74,6 +77,16 @@ def joined(
     jet, output = jet[order], output[order]
     joint = PointTerms(jet, np.zeros_like(jet), output, np.zeros_like(output))
     return Instants(k[order], s[order], weights[order]), [joint]
+
+
+def _at_nodes(rows: LimitRows) -> list[RowsAtNodes]:
+    """The rows of every order as sums of values at the nodes of `forces_of`."""
+    found = []
+    for order in map(int, np.unique(rows.orders)):
+        own = np.flatnonzero(rows.orders == order)
+        values = _values_in(rows.table[own], rows.grid, order)
+        found.append((order, own, rows.intervals[own], rows.joints[own], values))
+    return found
 
 
 def _values_in(table: Array, grid: Grid, order: int) -> Array:

@@ -17,7 +17,7 @@ from hovi.optimize.bordered_model import EquationModel
 from hovi.optimize.bounded_objective import BoundedOutcome, Outputs
 from hovi.optimize.interior_point import minimize_bounded
 from hovi.optimize.merge_tree import MergeTreeModel
-from hovi.optimize.nearby_bounded import follow_bounded
+from hovi.optimize.nearby_bounded import ROOM, follow_bounded
 from hovi.optimize.trust_region import Iteration, Options, Stop
 from hovi.planning.clearance.clearance import DISTANCE_SCALE
 from hovi.planning.clearance.clearance_violation import (
@@ -25,7 +25,7 @@ from hovi.planning.clearance.clearance_violation import (
     approach_sentence,
     near_pairs,
 )
-from hovi.planning.problem.limit_violation import excess_along, worst_sentence
+from hovi.planning.problem.limit_violation import excess_along, excess_of, worst_sentence
 from hovi.planning.problem.limits import Limits
 from hovi.planning.problem.presolve.end_torques import static_sentence
 from hovi.planning.problem.problem import TrajectoryProblem
@@ -285,12 +285,17 @@ class BoundedSearch:
         return self._noted(outcome, objective)
 
     def followed(
-        self, objective: BoundedAction, path: DiscretePath, known: Barrier, options: Options
+        self,
+        objective: BoundedAction,
+        path: DiscretePath,
+        known: Barrier,
+        options: Options,
+        most_outside: float = ROOM,
     ) -> Bounded:
         """A solve of an objective from the solution of a similar problem: see follow_bounded."""
         raise_if_late()
         known = dataclasses.replace(known, bounds=objective.bounds)
-        outcome = follow_bounded(objective, path, known, options, self.report)
+        outcome = follow_bounded(objective, path, known, options, self.report, most_outside)
         return self._noted(outcome, objective)
 
     def _noted(self, outcome: Bounded, objective: BoundedAction) -> Bounded:
@@ -351,11 +356,11 @@ class BoundedSearch:
     def excess(self, path: DiscretePath) -> Array:
         """Excess over lower and upper bounds in every interval, shape (2, N, kinds nv + pairs).
 
-        What rows bound holds by construction, and is looked at at samples alone.
+        What rows bound holds by construction: -inf.
         """
         trajectory = self.problem.trajectory(path)
-        excess = excess_along(trajectory, self.limits, self.rows.of.others(self.limits))
-        sides = np.stack([excess.lower, excess.upper]).reshape(2, len(excess.lower), -1)
+        both = excess_of(trajectory, self.limits, self.rows.of.others(self.limits))
+        sides = np.stack(both).reshape(2, len(both[0]), -1)
         if self.clearance is None:
             return sides
         least = self.least_distance
@@ -379,8 +384,8 @@ class BoundedSearch:
         """The limit or distance that is violated most: joint or pair, and time."""
         trajectory = self.problem.trajectory(path)
         if self.clearance is not None:
-            sides, first = self.excess(path), self.limits.lower.size
-            if sides[:, :, first:].max() >= sides[:, :, :first].max():
+            short = self.excess(path)[:, :, self.limits.lower.size :].max()
+            if short >= excess_along(trajectory, self.limits, refined=False).worst:
                 distances, least = self.clearance.distances, self.least_distance
                 approach = approach_along(trajectory, distances, least)
                 margin = least - self.limits.tolerance * DISTANCE_SCALE

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator
+from itertools import chain
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from hovi.discrete.grid import DiscretePath
 from hovi.discrete.guess import stretched, with_bump
 from hovi.optimize.barrier import Barrier
 from hovi.optimize.bounded_objective import STOPPED, Outputs
+from hovi.optimize.nearby_bounded import ROOM
 from hovi.optimize.trust_region import Options, Stop, minimize
 from hovi.planning.clearance.clearance_violation import approach_along
 from hovi.planning.problem.limits import no_limits
@@ -27,11 +28,7 @@ from hovi.planning.solver.methods.bounded_search import (
 )
 from hovi.planning.solver.methods.cleared_motion import cleared_motion
 from hovi.planning.solver.multipliers import Multipliers
-from hovi.planning.solver.penalized_action import (
-    LeastViolation,
-    PenalizedAction,
-    least_violation,
-)
+from hovi.planning.solver.penalized_action import LeastViolation, PenalizedAction, least_violation
 
 PENALTIES = 1.0, 1e2, 1e4, 1e6
 """Penalties of violated limits, relative to the mean density, if the interior point fails."""
@@ -51,8 +48,7 @@ NEARBY_MU = 1e-2
 """First barrier parameter from a motion that nearly is a solution, relative to the mean density of
 the objective: a larger one moves it away from its bounds, and perhaps to another minimum."""
 SHIFT_LEVEL = 1.0
-"""Barrier parameter at which a moved problem is begun, relative to the largest move of an
-output."""
+"""Barrier parameter where a moved problem is begun, relative to the largest move of an output."""
 SHIFT_LEVELS = 1e-5, 3e-2
 """Least and largest such parameter."""
 WARM_SHIFT = 1e-3
@@ -62,6 +58,8 @@ NEWTON_SHIFT, NEWTON_STEPS = 0.1, 20
 WARM_BARRIER, WARM_DECREASE = 1e-7, 3e-7
 """Its barrier parameter, and the predicted decrease at which it ends, relative to the cost: the
 cost exceeds its minimum by less than 1e-6."""
+COMPARED = 1e-4, 5e-3
+"""That decrease where the cost alone is asked for, and how far outputs may be outside then."""
 WARM_MARGIN = 1e-6
 """Least distance of its slacks from their bounds."""
 WARM_STEPS = 100
@@ -103,24 +101,29 @@ def _solved_nearby(search: BoundedSearch, path: DiscretePath) -> Bounded | None:
     if not search.options.near or search.clearance is not None or constrained:
         return None
     whole = search.options
-    if search.near is None:  # or a solve from the guess is shorter
-        most = min(WARM_STEPS, whole.max_iterations)
-        search.options = dataclasses.replace(whole, max_iterations=most)
-    along = search.along
+    most = WARM_STEPS if search.near is None else whole.max_iterations
+    most = min(most, whole.max_iterations)  # or a solve from the guess is shorter
+    search.options, along = dataclasses.replace(whole, max_iterations=most), search.along
     outcome = solved_from(search, path) if along is None else _solved_along(search, along)
     if along is not None and along.rows is None and not outcome.settled:
         search.rows, search.multipliers = search.coarse_rows(), None
         search.near = None if search.near is None else search.no_near_rows()
         outcome = solved_from(search, path)
     search.options = whole
+    left = whole.max_iterations - outcome.iterations
+    if outcome.stop is Stop.ITERATION_LIMIT and outcome.feasible and left > 0:  # it goes on there
+        search.options = dataclasses.replace(whole, max_iterations=left)
+        outcome = search.solve(outcome.x, outcome.barrier)
+        search.options = whole
+        return outcome if outcome.stop is not Stop.DIVERGED else None
     return outcome if outcome.settled else None
 
 
 def _solved_at_all(search: BoundedSearch, path: DiscretePath) -> Bounded:
-    if search.near is None:
-        return search.solve(path)
-    search.near = search.no_near_rows()
-    return cleared_motion(search, path)
+    if search.near is not None:
+        search.near = search.no_near_rows()
+        return cleared_motion(search, path)
+    return search.solve(path)
 
 
 def _solved_along(search: BoundedSearch, along: CentralPath) -> Bounded:
@@ -158,22 +161,28 @@ def _adopt(search: BoundedSearch, along: CentralPath) -> None:
 
 
 def follow(problem: TrajectoryProblem, along: CentralPath, barrier: float) -> CentralPath | None:
-    """The central path of a problem that ends at a solution near that of a similar problem.
+    """The central path of a problem that ends near its solution, which is near that of another one.
 
-    None where whole Newton steps do not find it, or where time runs out.
+    Its cost is that of the solution to COMPARED. None where whole Newton steps do not find
+    it, or where time runs out.
     barrier: last barrier parameter, relative to the mean density of the cost.
     """
     limits = problem.limits or no_limits(problem.coordinates)
     search = BoundedSearch(problem, limits, Options(barrier=barrier), None, along.last, along=along)
     _adopt(search, along)
-    outcome = _followed(search, along)
-    if outcome is None or not outcome.converged:
+    outcome = _followed(search, along, COMPARED)
+    if outcome is None or outcome.stop is not Stop.STATIONARY:
         return None
     return search.central_path(outcome)
 
 
-def _followed(search: BoundedSearch, along: CentralPath) -> Bounded | None:
-    """Follow the solution of a central path by whole Newton steps; None if it is not found so."""
+def _followed(
+    search: BoundedSearch, along: CentralPath, enough: tuple[float, float] = (WARM_DECREASE, ROOM)
+) -> Bounded | None:
+    """Follow the solution of a central path by whole Newton steps; None if it is not found so.
+
+    enough: predicted decrease and distance of outputs from their bounds at which it ends.
+    """
     known = along.barrier
     if known is None or search.near is not None or search.problem.constrained:
         return None
@@ -184,11 +193,11 @@ def _followed(search: BoundedSearch, along: CentralPath) -> Bounded | None:
     options = dataclasses.replace(
         search.remaining_options(),
         barrier=max(search.options.barrier, WARM_BARRIER),
-        enough=WARM_DECREASE,
+        enough=enough[0],
         max_iterations=min(NEWTON_STEPS, search.options.max_iterations),
     )
-    outcome = search.followed(objective, moved, known, options)
-    if outcome.settled:
+    outcome = search.followed(objective, moved, known, options, enough[1])
+    if outcome.stop is Stop.STATIONARY or outcome.stop in STOPPED:
         return outcome
     _adopt(search, along)
     return None
@@ -326,7 +335,8 @@ def _restored(search: BoundedSearch, outcome: Bounded) -> tuple[Bounded, str]:
     objective = search.objective(known)
     density = mean_density(outcome.outputs, objective.bounds.measure)
     least = np.inf
-    for guess in _guesses(search):
+    bumped = (_bumped_guess(search, seed) for seed in range(BUMPED_GUESSES))
+    for guess in chain([search.guess], bumped):
         path, violation, stop = _penalized(search, objective, guess, density)
         if stop in STOPPED:
             outcome.stop = stop
@@ -361,13 +371,6 @@ def _without_forces(
     objective = search.objective(known)
     outputs = objective.outputs(path)
     return objective, outputs, Barrier.inactive(objective.bounds, outputs.y)
-
-
-def _guesses(search: BoundedSearch) -> Iterator[DiscretePath]:
-    """The guess, then perturbations of it."""
-    yield search.guess
-    for seed in range(BUMPED_GUESSES):
-        yield _bumped_guess(search, seed)
 
 
 def _bumped_guess(search: BoundedSearch, seed: int, share: float = 1.0) -> DiscretePath:
