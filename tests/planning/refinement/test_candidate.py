@@ -14,9 +14,9 @@ from hovi.discrete.measures.motion_error import deviation
 from hovi.discrete.state import State
 from hovi.planning.problem.limits import as_limits
 from hovi.planning.problem.problem import TrajectoryProblem
-from hovi.planning.problem.tolerance import Tolerance
+from hovi.planning.problem.tolerance import Quantity, Tolerance
 from hovi.planning.refinement.adaptive import refine_to_tolerance
-from hovi.planning.refinement.candidate import Candidate, error_of_cost
+from hovi.planning.refinement.candidate import BARRIER_EXCESS, Candidate, error_of_cost
 from hovi.planning.solver.solver import Solution, solve_on_grid
 from hovi.scene.scene import Scene
 from hovi.schemes import by_name
@@ -59,6 +59,17 @@ def test_under_limits_estimates_are_not_below_the_true_errors(
     assert min(ratios) > 0.8
     assert np.mean(np.array(ratios) > 1.0) > 0.8
     assert max(ratios) < 4.0
+
+
+def test_an_error_within_limits_contains_what_a_barrier_costs(
+    arm_scene: Scene, limited_reference: Solution
+) -> None:
+    problem = reach(arm_scene, "galerkin-2x8", 64, limits=FAST)
+    known = [solve_on_grid(problem, limited_reference.trajectory, barrier=b) for b in (1e-5, 1e-7)]
+    excess = known[0].cost / known[1].cost - 1.0
+    assert 1e-6 < excess < BARRIER_EXCESS * 1e-5
+    errors = [Candidate.of(each, Tolerance(1e-3, Quantity.COST)).error for each in known]
+    assert errors[1] < 0.5 * BARRIER_EXCESS * 1e-5 < BARRIER_EXCESS * 1e-5 < errors[0]
 
 
 # Cancellation

@@ -21,6 +21,7 @@ from hovi.planning.problem.limits import Limits
 from hovi.planning.problem.problem import MORE_MODES, TrajectoryProblem
 from hovi.planning.refinement.candidate import contributions
 from hovi.planning.refinement.error_estimate import estimate_error, finer_than
+from hovi.planning.solver.receding.last_motion import meets
 from hovi.planning.solver.solver import Solution, solve_on_grid
 from hovi.robot.loading import load_robot
 from hovi.robot.robot import Robot
@@ -282,6 +283,24 @@ def test_a_richer_motion_is_finished_from_its_own_barrier(arm_scene: Scene) -> N
     assert finished.cost == pytest.approx(finer.cost, rel=1e-6)
     t = np.linspace(0.0, 1.0, 10_001)
     assert np.abs(finished.trajectory.sample(t).v).max() <= 3.0 * (1 + 2e-6)
+
+
+def test_a_richer_motion_that_meets_its_limits_everywhere_is_finished(arm_scene: Scene) -> None:
+    lower = np.full((4, 2), -np.inf)
+    lower[1] = -3.0
+    problem = reach_problem(arm_scene, Grid.uniform(1.0, 12, galerkin(2)))
+    limits = Limits(lower, -lower)
+    limited = solve_on_grid(dataclasses.replace(problem, limits=limits), barrier=1e-6)
+    finer = finer_than(limited)
+    assert finer is not None
+    finished = finer.finish()
+    assert finished is not None
+    assert finished.trajectory.path is finer.path
+    assert finished.central is not None
+    assert finished.central.rows is not None
+    assert not finished.central.rows.fixed
+    assert finished.problem is not None
+    assert meets(finished.problem, finer.path)
 
 
 def test_only_minima_have_an_estimate(reach_reference: Solution) -> None:

@@ -14,7 +14,7 @@ from hovi.planning.clearance.clearance import DISTANCE_SCALE, Clearance
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.search.job import Job
 from hovi.planning.solver.action_objective import ActionObjective
-from hovi.planning.solver.near.approaches import Approaches, approaches_along
+from hovi.planning.solver.near.approaches import USED, Approaches, approaches_along
 from hovi.planning.solver.near.clearance_rows import (
     BESIDE,
     LEAST_ROUNDING,
@@ -183,3 +183,16 @@ def test_thinned_rows_are_those_of_near_pairs() -> None:
     np.testing.assert_array_equal(ordered[kept], near.values(path))
     assert (near.values(path) <= within / DISTANCE_SCALE).all()
     assert 0 < near.size < rows.size
+
+
+@pytest.mark.parametrize(("share", "wanted"), [(-1.0, True), (0.5, False), (2.0, True)])
+def test_what_a_motion_may_use_up_between_rows_gets_none(share: float, wanted: bool) -> None:
+    """share: by how much it is too close, relative to what it may use up."""
+    problem = problem_of("ur5")
+    path, distances = wavy(problem), problem.distances
+    assert distances is not None
+    t = np.linspace(0.0, problem.grid.duration, 20_001)
+    nearest = float(distances.values(problem.trajectory(path).configurations(t)).min())
+    found = approaches_along(problem, path, distances, nearest + share * USED, 0.0)
+    assert (len(found.pairs) > 0) == wanted
+    assert found.too_close.any() == (share > 1.0)

@@ -111,12 +111,21 @@ def approaches_along(
     pairs = np.flatnonzero(d.min(axis=0) < least + max(ahead, CLOSE))  # nearer between samples
     d = d[:, pairs]
     chosen = (np.arange(len(d)) % (SAMPLES // SPREAD) == 0) & free_ones(problem, len(d))
-    rows, columns = np.nonzero(chosen[:, None] & (d < least + ahead))
+    rows, columns = np.nonzero(chosen[:, None] & (d < least + ahead) & ~_allowed(d, least))
     lowest = _refined(problem, path, distances.restricted(pairs.tolist()), d, least + CLOSE)
-    at = np.concatenate([rows / SAMPLES, lowest[0]])
-    too_close = np.append(np.zeros(len(rows), dtype=bool), lowest[2] < least - USED)
+    wanted = ~_allowed(lowest[2], least)
+    at = np.concatenate([rows / SAMPLES, lowest[0][wanted]])
+    too_close = np.append(np.zeros(len(rows), dtype=bool), lowest[2][wanted] < least)
     nearest = float(d[free_ones(problem, len(d))].min(initial=np.inf))
-    return Approaches(at, pairs[np.append(columns, lowest[1])], too_close, nearest)
+    return Approaches(at, pairs[np.append(columns, lowest[1][wanted])], too_close, nearest)
+
+
+def _allowed(d: Array, least: float) -> Mask:
+    """Where distances are less than those of rows by no more than a motion may use up between them.
+
+    A row there would begin outside of its bound, for nothing.
+    """
+    return (d < least) & (d >= least - USED)
 
 
 def _refined(
@@ -146,8 +155,10 @@ def spread_approaches(d: Array, watched: Mask, least: float, guard: float) -> Ap
 
     watched: of these, those without rows. guard: distance beyond the least one, in [m].
     """
-    rows, columns = np.nonzero(watched & (d < least + guard))
-    at, pairs, _ = _minima(d, least + CLOSE, SPREAD)
+    rows, columns = np.nonzero(watched & (d < least + guard) & ~_allowed(d, least))
+    at, pairs, value = _minima(d, least + CLOSE, SPREAD)
+    wanted = ~_allowed(value, least)
+    at, pairs = at[wanted], pairs[wanted]
     at, pairs = np.append(rows / SPREAD, at), np.append(columns, pairs)
     return Approaches(at, pairs, np.zeros(len(at), dtype=bool), spacing=WIDE_SPACING)
 
