@@ -26,6 +26,9 @@ CORRECTIONS = 3
 """Maximum number of corrections of outliers in one step."""
 MAX_STRETCH = 1.5
 """Largest length of a corrected step, relative to the radius."""
+LARGER_DENSITY, LEAST_DENSITY = 3.0, 1e-3
+"""Mean density of the objective, relative to the present one, up to which the first one is the unit
+of the last barrier parameter, and the least unit, relative to the first one."""
 LONG_STEP = 0.95
 """Shares of a direction above which it needs no correction."""
 SHORTER_SHARES = 0.8, 0.6, 0.4, 0.2, 0.1, 0.03, 0.01, 1e-3
@@ -73,7 +76,6 @@ class BoundedSteps(Generic[X]):
         self.outcome = outcome
         self.options = options
         self.density = density
-        self.final_mu = options.barrier * density
         self.product = outcome.barrier.mean_product()
         self.radius = options.radius
         self.shift = 0.0
@@ -185,6 +187,12 @@ class BoundedSteps(Generic[X]):
     def scale(self) -> float:
         """Magnitude of the objective, to which decreases are relative; positive."""
         return max(abs(self.outcome.outputs.value), 1e-10 * self.density * self._measure)
+
+    @property
+    def final_mu(self) -> float:
+        """The last mu, for the first mean density, or the present one where that is far smaller."""
+        share = LARGER_DENSITY * self.scale() / (self.density * self._measure)
+        return self.options.barrier * self.density * min(max(share, LEAST_DENSITY), 1.0)
 
     @property
     def noise(self) -> float:
