@@ -60,7 +60,7 @@ class LimitRows:
     barrier: the last barrier parameter, relative to the mean density of the cost.
 
     bounds: lower and upper ones of the E rows, (E,) each. weights: of the rows in a barrier, (E,),
-    in [s]. at_nodes: see `forces_of`, which keeps it here.
+    in [s]. at_nodes: cache of `forces_of`.
     """
 
     bounds: tuple[Array, Array]
@@ -235,6 +235,7 @@ class LimitRows:
         self._beyond = (rows.table - rows.beside) * scale
 
     def _share_of_intervals(self) -> Array:
+        """The weights."""
         return np.asarray(WEIGHT * self.grid.steps[self.intervals])
 
     def _rows_of(self, parts: LimitedParts) -> _Rows:
