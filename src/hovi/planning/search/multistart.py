@@ -255,30 +255,31 @@ def _from_path_or_direct(pool: Pool, first: FirstGuesses, progress: Progress) ->
     if pool.free is None and takes_rows(pool.job.problem()):
         ways = "rows", "points"
     guesses = first.paths[0], first.direct
-    tried, lost, stopped = list[tuple[int, Solution]](), list[str](), False
-    failed = {0, 1}  # guesses that another way may help
+    tried, stopped = list[tuple[int, Solution]](), False
+    left = {0, 1}  # guesses that are still worth trying
     for way, i in itertools.product(ways, (0, 1)):
-        if i not in failed:
+        if i not in left:
             continue
         if tried:
-            progress("from the direct guess" if i == 1 else "from the path, at points", 0.5)
+            at_points = ", distances at quadrature points" if way == "points" else ""
+            progress(("from the path", "from the direct guess")[i] + at_points, 0.5)
         try:
-            found = pool.solve_all([guesses[i]], way)
+            found = pool.solve_all([guesses[i]], way)  # a single one in this process
         except KeyboardInterrupt:
             if not tried:
                 raise
             record_interrupt()
             stopped = True
             break
-        tried += [(i, each) for each in found.solutions]
-        lost, stopped = [*lost, *found.lost], found.interrupted
-        if any(each.success for each in found.solutions) or stopped or pool.deadline.passed:
+        solution, stopped = found.solutions[0], found.interrupted
+        tried.append((i, solution))
+        if solution.success or stopped or pool.deadline.passed:
             break
-        if not any(each.status in WITHOUT_MOTION for each in found.solutions):
-            failed.discard(i)
+        if solution.status not in WITHOUT_MOTION:
+            left.discard(i)
     minima = distinct([each for _, each in tried])
     by_path = tuple(each.trajectory for i, each in tried if i == 0)
-    return Exploration(minima, len(tried), stopped, tuple(lost), first, by_path)
+    return Exploration(minima, len(tried), stopped, (), first, by_path)
 
 
 def _round(
