@@ -1,7 +1,8 @@
 // The logarithmic barrier of slacks between bounds: its Newton steps and their lengths.
 //
-// Several slacks are done at a time, in the lanes of a pack, and the last ones one by one: functions
-// of a type V are for both. Everything is in an unnamed namespace: see simd/dispatch.hpp.
+// Slacks are processed several at a time, in the lanes of a pack, and the last ones one by one: a
+// template with a type V is for packs and for numbers. Everything is in an unnamed namespace: see
+// simd/dispatch.hpp.
 #pragma once
 
 #include <cstddef>
@@ -29,7 +30,7 @@ inline Pack root(Pack x) {
   return x;
 }
 
-// As std::max and std::min: the first where one of them is no number.
+// As std::max and std::min, which return the first argument where one is NaN.
 template <typename V>
 inline V larger(const V& a, const V& b) {
   return a < b ? b : a;
@@ -47,7 +48,8 @@ inline V between(const V& x, const V& low, const V& high) {
   return smaller(larger(x, low), high);
 }
 
-// Calls work(i, V) for the numbers from 0: with a pack for as many as fill its lanes.
+// Calls work(i, V) for i from 0 to count: with a pack for as many as fill its lanes at a time, then
+// with a number for each of the others.
 template <typename Work>
 inline void over(std::size_t count, const Work& work) {
   const std::size_t whole = count - count % lanes;
@@ -55,7 +57,7 @@ inline void over(std::size_t count, const Work& work) {
   for (std::size_t i = whole; i < count; ++i) work(i, 0.0);
 }
 
-// A number in every lane, and that of the last slacks.
+// A sum or an extreme of all slacks: of those in every lane, and of the last ones.
 struct Reduced {
   explicit Reduced(double x) : packs(broadcast(x)), rest(x) {}
   Pack& of(const Pack&) { return packs; }
@@ -75,7 +77,7 @@ struct Reduced {
   double rest;
 };
 
-// Slacks from number i on.
+// The slacks in a pack from number i on, or slack number i.
 template <typename V>
 struct Some {
   Some(const Slacks& at, std::size_t i, const V& kind)
@@ -89,7 +91,7 @@ struct Some {
         below(larger<V>(s - lower, gap)),
         above(larger<V>(upper - s, gap)) {}
 
-  // The first where there is the bound, else the second.
+  // a where there is a lower, or an upper, bound; b where there is none.
   V where_lower(const V& a, const V& b) const { return lower > -infinity ? a : b; }
   V where_upper(const V& a, const V& b) const { return upper < infinity ? a : b; }
 
@@ -222,7 +224,7 @@ class LogSum {
   }
 
  private:
-  // As long as every one of them is between 1e-16 and 1e16, their product is a number above 0.
+  // The product of so many gaps between 1e-16 and 1e16 neither underflows nor overflows.
   static constexpr int most_factors = 16;
 
   void flush() {
@@ -239,7 +241,7 @@ class LogSum {
   int factors_ = 0;
 };
 
-// The number from which on weights are others than that of a number.
+// The end of the run of equal weights that begins at `first`.
 inline std::size_t end_of_weight(const double* weights, std::size_t first, std::size_t count) {
   std::size_t last = first + 1;
   while (last < count && weights[last] == weights[first]) ++last;
@@ -269,7 +271,7 @@ double merit(const Slacks& at, const double* weights, const double* y, const dou
   return penalty * misfits - mu * barrier;
 }
 
-// Whether log(ratio) > least, mostly without a logarithm: 1 - 1/x <= log x <= x - 1.
+// Whether log(ratio) > least; the bounds 1 - 1/x <= log x <= x - 1 mostly save the logarithm.
 inline bool exceeds(double ratio, double least) {
   if (1.0 - 1.0 / ratio > least) return true;
   return ratio - 1.0 > least && __builtin_log(ratio) > least;
@@ -315,9 +317,9 @@ inline V central_gap(const V& w, const V& c, double mu) {
   return w > 0.0 ? 2.0 * mu / (size + w) : (size - w) / (2.0 * c);
 }
 
-// The slacks between two bounds at the gap of the one that matters more, by given differences w of
-// the multipliers and c gaps, and not beyond the middle; y without any bound. With the multipliers
-// with which their products z gap are mu. Returns the slacks, and zu - zl.
+// Writes the slacks at the central gap of the bound that matters more, and not beyond the middle,
+// or at y without bounds; and the multipliers whose products z gap are mu.
+// low, high: z - c gap of the two bounds. force: becomes zu - zl. Returns the slacks.
 template <typename V>
 inline V set_central(const Some<V>& x, std::size_t i, const V& y, const V& low, const V& high,
                      const V& c, double mu, const Direction& out, V& force) {

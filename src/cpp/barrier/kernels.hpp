@@ -69,11 +69,11 @@ struct Kernels {
   // The point of the central path with mu that belongs to slacks and multipliers of another one.
   void (*recenter)(const Slacks& at, double c, double mu, const Direction& out);
 
-  // After a Newton step dy of the outputs y, to y_new, from a point of the central path with mu: the
-  // point with the next mu. Multipliers are those that the step predicts, gaps those of y_new, and
-  // what both say of a bound is weighed with c, the geometric mean of the ratio of multiplier and
-  // gap before and of the least one. With the ratio alone bounds would be released slowly, with the
-  // least one found slowly.
+  // After a Newton step dy of the outputs y, to y_new, from a point of the central path with mu:
+  // the point with the next mu. Multipliers are those that the step predicts, gaps those of y_new,
+  // and what both say of a bound is weighed with c, the geometric mean of the ratio of multiplier
+  // and gap before and of the least one. With the ratio alone bounds would be released slowly, with
+  // the least one found slowly.
   Misses (*follow)(const Slacks& at, const double* weights, const double* y, const double* dy,
                    const double* y_new, double mu, double next_mu, double least,
                    const Direction& out);

@@ -64,7 +64,7 @@ void condense(const Vector& lower, const Vector& upper, const Vector& s, const V
   const Slacks at = slacks_of(lower, upper, s, zl, zu);
   const std::size_t R = at.count;
   kernels().condense(at, vector("y", R, y), mu, vector("sigma", R, sigma),
-                          vector("rho", R, rho), vector("force", R, force));
+                     vector("rho", R, rho), vector("force", R, force));
 }
 
 void shift(const Vector& lower, const Vector& upper, const Vector& s, const Vector& zl,
@@ -73,7 +73,7 @@ void shift(const Vector& lower, const Vector& upper, const Vector& s, const Vect
   const Slacks at = slacks_of(lower, upper, s, zl, zu);
   const std::size_t R = at.count;
   kernels().shift(at, mu, vector("lower_targets", R, lower_targets),
-                       vector("upper_targets", R, upper_targets), vector("out", R, out));
+                  vector("upper_targets", R, upper_targets), vector("out", R, out));
 }
 
 std::tuple<double, double, double, double> aim(
@@ -107,8 +107,8 @@ void correct(const Vector& lower, const Vector& upper, const Vector& s, const Ve
   const Slacks at = slacks_of(lower, upper, s, zl, zu);
   const std::size_t R = at.count;
   kernels().correct(at, vector("y", R, y), direction_of(R, ds, dzl, dzu), mu, matched,
-                         vector("lower_targets", R, lower_targets),
-                         vector("upper_targets", R, upper_targets));
+                    vector("lower_targets", R, lower_targets),
+                    vector("upper_targets", R, upper_targets));
 }
 
 void center(const Vector& lower, const Vector& upper, const Vector& s, const Vector& zl,
@@ -118,8 +118,8 @@ void center(const Vector& lower, const Vector& upper, const Vector& s, const Vec
   const Slacks at = slacks_of(lower, upper, s, zl, zu);
   const std::size_t R = at.count;
   kernels().center(at, vector("y", R, y), direction_of(R, ds, dzl, dzu), primal, dual, mu,
-                        matched, vector("lower_targets", R, lower_targets),
-                        vector("upper_targets", R, upper_targets));
+                   matched, vector("lower_targets", R, lower_targets),
+                   vector("upper_targets", R, upper_targets));
 }
 
 double merit(const Vector& lower, const Vector& upper, const Vector& s, const Vector& zl,
@@ -129,7 +129,7 @@ double merit(const Vector& lower, const Vector& upper, const Vector& s, const Ve
   const Slacks at = slacks_of(lower, upper, s, zl, zu);
   const std::size_t R = at.count;
   return kernels().merit(at, vector("weights", R, weights), vector("y", R, y),
-                              vector("dy", R, dy), vector("ds", R, ds), share, keep, mu, penalty);
+                         vector("dy", R, dy), vector("ds", R, ds), share, keep, mu, penalty);
 }
 
 void move(const Vector& lower, const Vector& upper, const Vector& s, const Vector& zl,
@@ -142,7 +142,7 @@ void move(const Vector& lower, const Vector& upper, const Vector& s, const Vecto
   const std::size_t R = at.count;
   const Direction out = new_slacks_of(R, new_s, new_zl, new_zu);
   kernels().move(at, vector("y", R, y), direction_of(R, ds, dzl, dzu), primal, dual, keep, mu,
-                      penalty, ratio, out);
+                 penalty, ratio, out);
 }
 
 void require_central(double c, double mu) {
@@ -169,8 +169,8 @@ std::tuple<double, double> follow(const Vector& lower, const Vector& upper, cons
   const std::size_t R = at.count;
   const Direction out = new_slacks_of(R, new_s, new_zl, new_zu);
   const auto misses = kernels().follow(at, vector("weights", R, weights), vector("y", R, y),
-                                            vector("dy", R, dy), vector("y_new", R, y_new), mu,
-                                            next_mu, least, out);
+                                       vector("dy", R, dy), vector("y_new", R, y_new), mu,
+                                       next_mu, least, out);
   return {misses.outside, misses.work};
 }
 

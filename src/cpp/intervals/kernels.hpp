@@ -57,7 +57,8 @@ struct Kernels {
   // The change of the rows, (E), in a step of the intervals' columns, (N, m, n). work: m numbers.
   void (*push_rows)(const LinearRows& of, const double* step, double* work, double* out);
 
-  // Add forces on the rows, (E), to a covector in the intervals' columns, (N, m, n). work: as above.
+  // Add forces on the rows, (E), to a covector in the intervals' columns, (N, m, n).
+  // work: m numbers.
   void (*pull_rows)(const LinearRows& of, const double* forces, double* work, double* out);
 
   // Add weights of the rows' squares, (E), to a Hessian, (N, m, m, n, n). work: m^2 numbers.

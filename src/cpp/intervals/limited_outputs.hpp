@@ -107,12 +107,32 @@ inline void in_runs(const LinearRows& of, const Work& work) {
   }
 }
 
-// m numbers, as many as a template names if it does: loops over them are unrolled then.
-constexpr std::size_t least_columns = 4, most_columns = 12, any_columns = 0;
+// A number of columns that is known at compile time, so that loops are unrolled; 0 for any number.
+template <std::size_t columns>
+struct Known {
+  static constexpr std::size_t value = columns;
+};
+
+// Calls work(Known<m>()) for the numbers of columns that most rows have, else work(Known<0>()).
+template <typename Work>
+inline void with_known_columns(std::size_t m, const Work& work) {
+  switch (m) {
+    case 4: return work(Known<4>());
+    case 5: return work(Known<5>());
+    case 6: return work(Known<6>());
+    case 7: return work(Known<7>());
+    case 8: return work(Known<8>());
+    case 9: return work(Known<9>());
+    case 10: return work(Known<10>());
+    case 11: return work(Known<11>());
+    case 12: return work(Known<12>());
+    default: return work(Known<0>());
+  }
+}
 
 template <std::size_t known>
 inline std::size_t columns_of(const LinearRows& of) {
-  return known == any_columns ? of.columns : known;
+  return known == 0 ? of.columns : known;
 }
 
 template <std::size_t known>
@@ -150,36 +170,22 @@ void add_squares_of(const LinearRows& of, const double* weights, double* work, d
   });
 }
 
-using OfRows = void (*)(const LinearRows&, const double*, double*, double*);
-
-// The function of a table for as many columns as rows have: the first of it is for any number.
-inline OfRows for_columns(const OfRows* functions, std::size_t m) {
-  const bool known = m >= least_columns && m <= most_columns;
-  return functions[known ? m - least_columns + 1 : 0];
-}
-
 void push_rows(const LinearRows& of, const double* step, double* work, double* out) {
-  constexpr OfRows functions[] = {
-      push_rows_of<any_columns>, push_rows_of<4>, push_rows_of<5>,  push_rows_of<6>,
-      push_rows_of<7>,           push_rows_of<8>, push_rows_of<9>,  push_rows_of<10>,
-      push_rows_of<11>,          push_rows_of<12>};
-  for_columns(functions, of.columns)(of, step, work, out);
+  with_known_columns(of.columns, [&](auto columns) {
+    push_rows_of<decltype(columns)::value>(of, step, work, out);
+  });
 }
 
 void pull_rows(const LinearRows& of, const double* forces, double* work, double* out) {
-  constexpr OfRows functions[] = {
-      pull_rows_of<any_columns>, pull_rows_of<4>, pull_rows_of<5>,  pull_rows_of<6>,
-      pull_rows_of<7>,           pull_rows_of<8>, pull_rows_of<9>,  pull_rows_of<10>,
-      pull_rows_of<11>,          pull_rows_of<12>};
-  for_columns(functions, of.columns)(of, forces, work, out);
+  with_known_columns(of.columns, [&](auto columns) {
+    pull_rows_of<decltype(columns)::value>(of, forces, work, out);
+  });
 }
 
 void add_squares(const LinearRows& of, const double* weights, double* work, double* out) {
-  constexpr OfRows functions[] = {
-      add_squares_of<any_columns>, add_squares_of<4>, add_squares_of<5>,  add_squares_of<6>,
-      add_squares_of<7>,           add_squares_of<8>, add_squares_of<9>,  add_squares_of<10>,
-      add_squares_of<11>,          add_squares_of<12>};
-  for_columns(functions, of.columns)(of, weights, work, out);
+  with_known_columns(of.columns, [&](auto columns) {
+    add_squares_of<decltype(columns)::value>(of, weights, work, out);
+  });
 }
 
 }  // namespace

@@ -145,7 +145,7 @@ class BoundedOutcome(Generic[X]):
 
     @property
     def settled(self) -> bool:
-        """Whether no further attempt is to be made: it converged, or was stopped."""
+        """Whether no other attempt is needed: it converged, or the whole search is stopped."""
         return self.converged or self.stop in STOPPED
 
     @contextmanager

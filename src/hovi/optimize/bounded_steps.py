@@ -40,17 +40,16 @@ it ends away from the bounds; of a corrected one until one of them predicts a de
 class BoundedStep:
     """A step of the primal-dual system, shortened such that the slacks stay inside.
 
-    along: the whole direction. share: of it that is taken. mu: at which it aims.
+    along: the whole direction. share: of it that is taken.
     decrease: predicted decrease of the merit function.
     remaining: decrease that the whole direction predicts for the objective with its barrier.
-    barrier, before: with that mu, and its merit at the point where the step begins.
+    barrier: of the current point, with the mu that the step aims at. before: its merit there.
     reaction: change of the multipliers of equations in the whole step; None without any.
     """
 
     trial: Trial
     along: Direction
     share: float
-    mu: float
     decrease: float
     remaining: float
     barrier: Barrier
@@ -180,9 +179,7 @@ class BoundedSteps(Generic[X]):
             share, predicted = shorter * longest, other
         trial = trial._replace(step=s, norm=math.sqrt(max(norm2, 0.0)))
         change = None if reaction is None else reaction[0]
-        return BoundedStep(
-            trial, along, share, barrier.mu, predicted, 0.5 * whole, barrier, before, change
-        )
+        return BoundedStep(trial, along, share, predicted, 0.5 * whole, barrier, before, change)
 
     def scale(self) -> float:
         """Magnitude of the objective, to which decreases are relative; positive."""

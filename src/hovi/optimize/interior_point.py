@@ -73,11 +73,11 @@ second of these, if the objective reopens; others begin with a radius that is wi
 SHORT_SHARE = 0.1
 """Share of a step at the radius below which it was too long for the bounds that cut it."""
 CUT_SHARE, MOST_CUT, RAISED = 0.5, 4, 10.0
-"""Share below which the bounds cut a step of a model that is not convex, how many such steps, or
-ones of less than SHORT_SHARE, follow each other before the barrier parameter rises, and by how
-much: it has fallen too early, and steps along the bounds would stay short."""
+"""Share of a step below which the bounds cut it where the model is not convex (SHORT_SHARE where it
+is), the number of such steps in a row after which the barrier parameter is raised, since it has
+fallen too early, and the factor by which it is raised."""
 LEAST_RAISED_GAP = 1e-9
-"""Least distance of slacks from their bounds then, relative to the range."""
+"""Least distance of slacks from their bounds after that, relative to the range."""
 MATCHED = 1e-4
 """Largest |y - s| at which the radius follows such steps."""
 CUT_RADIUS = 10.0
@@ -298,7 +298,7 @@ class _Iteration(BoundedSteps[X]):
 
     def _finished(self, step: BoundedStep, accepted: bool) -> bool:
         """Whether the last step, of the last mu, predicts next to nothing for its whole length."""
-        last = step.mu <= 1.01 * self.final_mu and self.product <= 10.0 * self.final_mu
+        last = step.barrier.mu <= 1.01 * self.final_mu and self.product <= 10.0 * self.final_mu
         enough = max(self.options.decrease, self.options.enough) * self.scale()
         whole = accepted and step.share >= WHOLE_STEP
         small = step.remaining <= SHORT_STEP_SHARE * enough
@@ -325,7 +325,7 @@ class _Iteration(BoundedSteps[X]):
             self.penalty = 0.0
 
     def _raise_mu(self, step: BoundedStep) -> None:
-        """Raise mu where bounds cut one step after another, most of all where curvature is left."""
+        """Raise mu if bounds have cut several steps in a row: steps along them would stay short."""
         outcome, objective = self.outcome, self.objective
         cut = step.share < (SHORT_SHARE if step.trial.newton else CUT_SHARE)
         self.cut = self.cut + 1 if cut and outcome.feasible and not objective.reopens else 0
@@ -335,7 +335,7 @@ class _Iteration(BoundedSteps[X]):
         bounds, y, scale = objective.bounds, outcome.outputs.y, outcome.barrier.scale
         outcome.barrier = Barrier.central(bounds, y, mu, scale, LEAST_RAISED_GAP)
         self.cut, self.penalty = 0, 0.0
-        # points with a smaller one are of the way back, not of the central path
+        # those with a smaller mu are no longer on the central path
         self.marks[:] = [mark for mark in self.marks if mark[0] > mu]
         self.marked = self.marks[-1][0] if self.marks else 0.0
 

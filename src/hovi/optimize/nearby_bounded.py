@@ -43,8 +43,9 @@ GAP_WEIGHT = 3.0
 ROOM = 2e-7
 """Distance by which bounds are moved inwards, and outputs may miss them at the end."""
 LARGEST_GROWTH, LEAST_OUTSIDE = 4.0, 3e-4
-"""How far outputs may be outside after a step, relative to how far they were at first from their
-bounds or from the known slacks, or to the least such distance: beyond, it does not converge."""
+"""Largest distance of outputs outside their bounds after a step, relative to their first distance
+from the bounds or the known slacks; and the least value of that first distance. Beyond, the
+iteration does not converge."""
 
 
 def follow_bounded(
@@ -61,8 +62,8 @@ def follow_bounded(
     known: of the solution of a similar problem with as many outputs.
     options: `barrier` is the last barrier parameter; it ends where the next step predicts, and the
         distance of slacks from outputs means, less than `enough` of the objective.
-    most_outside: how far outputs may be outside of their bounds at the end; with more than a trifle
-        it is the objective alone that is sought, and outputs are not refined.
+    most_outside: how far outputs may be outside their bounds at the end, relative to the range; if
+        more than ROOM, only the objective is wanted, and outputs are not refined.
     """
     outcome = BoundedOutcome(x, objective.outputs(x), known, Stop.DIVERGED)
     if not np.isfinite(outcome.outputs.value):

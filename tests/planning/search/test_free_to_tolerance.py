@@ -116,6 +116,15 @@ def test_no_accuracy_is_claimed_without_a_minimum(arm_scene: Scene) -> None:
     assert found.error_estimate is None
 
 
+def minimum_on(task: Task, grid: Grid, guess: Trajectory | str = "cubic") -> Solution:
+    ld = DiscreteLagrangian(task.scene.effort_lagrangian(), grid)
+    return solve_on_grid(TrajectoryProblem(ld, task.start, task.goal), guess)
+
+
+def solver_on(task: Task, grid: Grid) -> SolveFor:
+    return lambda T, guess: minimum_on(task, grid.stretched(T), guess)
+
+
 def in_vain(solution: Solution) -> Solution:
     """Refinement whose time is up at the start."""
     return refine_to_tolerance(solution, Tolerance(1e-14), time_limit=0.0)
@@ -156,8 +165,7 @@ def test_only_a_motion_whose_duration_is_the_best_on_its_grid_is_a_minimum_if_a_
         refined.append((refine if not refined or later_refine is None else later_refine)(solution))
         return refined[-1]
 
-    ld = DiscreteLagrangian(task.scene.effort_lagrangian(), coarse)
-    first = solve_on_grid(TrajectoryProblem(ld, task.start, task.goal))
+    first = minimum_on(task, coarse)
     found = free_to_tolerance(FreeDuration(*BOUNDS, WEIGHT), on_grid, each_refine, first)
     assert accuracy_of(refined[0]).reached
     assert found.success == (status is Status.MINIMUM)
@@ -182,22 +190,16 @@ def test_limits_hold_in_the_best_duration(arm_scene: Scene) -> None:
 
 def test_a_tolerance_that_is_not_reached_ends_the_search(task: Task) -> None:
     """No further grid is tried, and no motion refined twice."""
-    ld = DiscreteLagrangian(task.scene.effort_lagrangian(), Grid.uniform(1.0, 12, galerkin(2)))
-    first = solve_on_grid(TrajectoryProblem(ld, task.start, task.goal))
+    first = minimum_on(task, Grid.uniform(1.0, 12, galerkin(2)))
     refined: list[Solution] = []
 
     def refine(solution: Solution) -> Solution:
         refined.append(in_vain(solution))
         return refined[-1]
 
-    def on_grid(grid: Grid) -> SolveFor:
-        def solve_for(T: float, guess: Trajectory) -> Solution:
-            ld = DiscreteLagrangian(task.scene.effort_lagrangian(), grid.stretched(T))
-            return solve_on_grid(TrajectoryProblem(ld, task.start, task.goal), guess)
-
-        return solve_for
-
-    found = free_to_tolerance(FreeDuration(0.9, 1.1, WEIGHT), on_grid, refine, first)
+    found = free_to_tolerance(
+        FreeDuration(0.9, 1.1, WEIGHT), partial(solver_on, task), refine, first
+    )
     assert len(refined) == 1
     assert not accuracy_of(found).reached
     assert accuracy_of(found).rounds == accuracy_of(refined[0]).rounds
@@ -242,16 +244,10 @@ def test_after_the_last_grid_the_duration_is_the_best_and_the_error_is_that_of_t
         refined.append(refine_to_tolerance(solution, Tolerance(tolerance)))
         return refined[-1]
 
-    def on_grid(grid: Grid) -> SolveFor:
-        def solve_for(T: float, guess: Trajectory) -> Solution:
-            ld = DiscreteLagrangian(task.scene.effort_lagrangian(), grid.stretched(T))
-            return solve_on_grid(TrajectoryProblem(ld, task.start, task.goal), guess)
-
-        return solve_for
-
-    ld = DiscreteLagrangian(task.scene.effort_lagrangian(), Grid.uniform(1.0, 6, galerkin(2)))
-    first = solve_on_grid(TrajectoryProblem(ld, task.start, task.goal))
-    found = free_to_tolerance(FreeDuration(*BOUNDS, WEIGHT), on_grid, refine, first)
+    first = minimum_on(task, Grid.uniform(1.0, 6, galerkin(2)))
+    found = free_to_tolerance(
+        FreeDuration(*BOUNDS, WEIGHT), partial(solver_on, task), refine, first
+    )
     assert len(refined) == 1
     assert abs(refined[0].duration_derivative + WEIGHT) > 1e-7 * WEIGHT
     assert found.success, found.message

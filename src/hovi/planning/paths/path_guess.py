@@ -28,14 +28,13 @@ LEAST_LENGTH = 1e-9
 """Length below which two points of a path count as one, as a time at full speed, in [s]."""
 
 DRAWS = 4
-"""Number of paths of which one is taken, unless an earlier one is short enough."""
+"""Maximum number of paths that are planned until one is short enough."""
 PEAK = 1.875
 """Largest velocity of the motion of least jerk, relative to its mean."""
 STRAIGHT = 1.1
-"""Length of a path, relative to the straight one, up to which it is short enough anyway."""
-
+"""Length of a path, relative to the straight one, up to which it is short enough in any case."""
 SHORTER = 0.8
-"""Length of a path, relative to that of an earlier one, up to which it takes its place."""
+"""Length of a path, relative to an earlier one, below which it replaces that one."""
 
 
 def depth_of(problem: TrajectoryProblem, guess: DiscretePath) -> float:
@@ -82,11 +81,13 @@ def fast_path(
     seeds: Iterable[int],
     duration: float,
 ) -> Array | None:
-    """The first path that fits into a duration at the largest velocities, or the shortest one.
+    """The first path short enough for a duration, or about the shortest; None if there is none.
 
-    Paths of RRT-Connect differ in length by a factor of two and more; a motion along one that is
-    too long is far outside the limits on velocities. A later path is taken where it is much
-    shorter. None if there is none.
+    Paths of RRT-Connect differ in length by a factor of two and more, and a motion along one that
+    is too long is far outside the velocity limits.
+
+    ends: start and goal in the coordinates of the space, (nv,) each. seeds: one for each path.
+    duration: of the motion along it, in [s].
     """
     best, direct = None, _time_along(np.stack(ends))
     for seed in seeds:
@@ -101,7 +102,7 @@ def fast_path(
 
 
 def _time_along(points: Array) -> float:
-    """The time that a path (M, nv) takes at the largest velocities, in [s]."""
+    """The time that a path, (M, nv), takes at the velocity limits, in [s]."""
     return float(np.abs(np.diff(points, axis=0)).max(axis=1).sum())
 
 

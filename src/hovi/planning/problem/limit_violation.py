@@ -29,10 +29,10 @@ BATCH = 128
 REFINEMENT_SHARE = 0.05
 """The largest extreme of an output in an interval is refined if it is closer than this to a bound,
 as a share of its range."""
-COARSE = 4, 2
-"""Every which of these samples is looked at first in `excess_of`, with as many modes as in
-COARSE_MODES and with more."""
 COARSE_MODES = 4
+COARSE = 4, 2
+"""Stride of the samples that `excess_of` looks at first: on grids of at most COARSE_MODES inner
+modes, and on others."""
 PEAK_SHARE = 2e-3
 """The same for every other local extreme; smaller, as a motion along a bound has many of them."""
 AT_LIMIT = 1e-3
@@ -83,8 +83,8 @@ def excess_of(
 ) -> tuple[Array, Array]:
     """The excess over the lower and upper bounds of chosen outputs, (N, kinds, nv) each.
 
-    -inf for others. The same as that of `excess_along` wherever that may be positive. Elsewhere it
-    is that of a few samples, which stay further from their bounds than two neighbors differ.
+    -inf for others. It is that of `excess_along` wherever that may be positive; elsewhere it is
+    that of a few samples, which are further from their bounds than neighboring ones differ.
     chosen: shape (kinds, nv).
     """
     raise_if_late()

@@ -54,7 +54,8 @@ MAX_ROUNDS = 14
 MAX_STALLED_ROUNDS = 2
 """Consecutive rounds without an error smaller by half after which the refinement ends."""
 LEVEL = 1e-3
-"""Barrier parameter at which a solve on another grid begins among obstacles."""
+"""Barrier parameter at which a solve on another grid begins among obstacles, relative to the mean
+density of the cost."""
 MAX_POINTS = 400_000
 """Number of quadrature points of a grid above which no finer one is tried."""
 
@@ -248,7 +249,7 @@ class _Search:
     ) -> Solution:
         """Solve with the remaining time, from the last candidate's motion or a finer one.
 
-        along: follows the central path of that motion; None without one.
+        along: method that follows the central path of that motion; None for the default one.
         """
         steps = self.max_iterations
         if last.whirl is not None:
@@ -316,11 +317,11 @@ class _Search:
 def _along(
     central: CentralPath | None, known: TrajectoryProblem, problem: TrajectoryProblem
 ) -> Method | None:
-    """A method that follows a central path on another grid; None without one, or obstacles.
+    """A method that follows a central path on another grid; None without a path or obstacles.
 
-    A solution has pairs at their least distances, where every step ends; the point of the path with
-    a larger barrier has room.
-    known: the problem whose central path it is.
+    In a solution some pairs are at their least distance, so that steps from it are short; where the
+    barrier was larger, there is room.
+    known: the problem that the path belongs to. problem: the one on the other grid.
     """
     if central is None or problem.distances is None:
         return None

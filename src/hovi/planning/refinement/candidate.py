@@ -44,7 +44,7 @@ HAMILTONIAN_ERROR_SHARE = 0.1
 ROUNDING_FLOOR = 1e-14
 """Smallest estimate of the relative error of the cost."""
 BARRIER_EXCESS = 10.0
-"""Relative excess of a cost over its minimum per barrier parameter."""
+"""Relative excess of a cost over its minimum, per last barrier parameter of the solve."""
 LOOSE_SAFETY_FACTOR = 3.0
 """Factor on estimates above CURVE_TOLERANCE, where the finer solution is not much better."""
 CONTRADICTION_RATIO = 10.0
@@ -64,8 +64,8 @@ class Candidate:
         error inferred from the Hamiltonian.
     contradicted: relative difference from the cost on the next grid if it is far larger than the
         estimates, else 0.
-    later: relative difference from the most accurate cost of a later grid, or from a lower one of
-        an unfinished solve there.
+    later: relative difference from the most accurate cost of a later grid, or from the cost of an
+        unfinished solve there if that is lower.
     """
 
     solution: Solution
@@ -176,8 +176,8 @@ class Candidate:
     def compared_with(self, later_one: Candidate) -> Candidate:
         """This candidate with an error that a later grid's most accurate cost does not refute.
 
-        An unfinished solve without limits refutes it, too, where the motion it came to costs less:
-        the minimum that it goes to costs less still.
+        So does an unfinished solve without limits that has reached a lower cost: its minimum would
+        cost even less.
         """
         finer = later_one.finer
         if later_one.solution.success:
@@ -199,9 +199,9 @@ class Candidate:
 
 
 def _cost_of_unfinished(solution: Solution) -> float:
-    """The cost of a motion that is no minimum yet, along its own curve if that is more.
+    """The cost of an unfinished solve without limits: of the action, or along its curve if larger.
 
-    inf for one that need not meet the limits or equations.
+    inf if it may not meet limits or equations, or ended for another reason.
     """
     problem, status = solution.problem, solution.status
     if problem is None or status not in (Status.ITERATION_LIMIT, Status.TIME_LIMIT):
@@ -232,7 +232,7 @@ def _trusted(uncancelled: float, tolerance: Tolerance) -> bool:
 
 
 def error_of_cost(solution: Solution, finer: FinerSolution) -> float:
-    """Relative error of the cost, with the effects of the limits' tolerance and of a barrier on it.
+    """Relative error of the cost, including the effects of the limits' tolerance and the barrier.
 
     Not below ROUNDING_FLOOR; 0 for zero cost with zero error.
     """
@@ -249,9 +249,9 @@ def error_of_cost(solution: Solution, finer: FinerSolution) -> float:
 
 
 def _excess_of_bounds(solution: Solution) -> float:
-    """By what share a cost may exceed its minimum, beyond MAX_LOSS, where solves ended early.
+    """Relative excess of a cost over its minimum as the solve ended early, beyond MAX_LOSS.
 
-    That of control points beside the curve, and ten times the last barrier parameter.
+    That of control points away from the curve, and BARRIER_EXCESS times the last barrier parameter.
     """
     central = solution.central
     if central is None:

@@ -44,7 +44,7 @@ RICHER_BARRIER = 1e-7
 """Its least last barrier parameter, whose share of the cost is less than errors that can be told.
 """
 SAME_LEVEL = 1.1
-"""Ratio of its last barrier parameter to the one asked for up to which it was solved to the end."""
+"""Ratio of its last barrier parameter to the wanted one up to which it needs no further steps."""
 MAX_FINER_STEPS = 80
 """Maximum number of steps to a finer solution: one that takes more is not near."""
 
@@ -182,8 +182,8 @@ def followed_within_limits(solution: Solution, known: FinerSolution) -> FinerSol
 def _finished(found: FinerSolution, barrier: float) -> Solution | None:
     """A motion that is no minimum yet, or whose limits were not checked, solved to the end.
 
-    Where it was solved to the end, and meets its limits between the points too, it is that motion.
-    barrier: last barrier parameter.
+    It is returned as it is if it was solved to the end and meets its limits between the points too.
+    barrier: last barrier parameter, relative to the mean density of the cost.
     """
     from hovi.planning.solver.methods.interior_point import InteriorPoint
 
@@ -260,7 +260,8 @@ def _cost_of_difference(
 ) -> Array:
     """1/2 int dtau^T R dtau over each interval, shape (N,), with dtau the difference of torques.
 
-    Where no torque has a weight, shares of the difference of the costs like those with R = 1.
+    If no torque has a weight: `difference`, shared out in proportion to those with R = 1.
+    difference: of the two costs.
     """
     ld, coarse = problem.ld, problem.trajectory(path)
     N = coarse.grid.intervals

@@ -117,9 +117,10 @@ def resolved(solution: Solution) -> Solution:
         scheme; under limits every interval is halved instead;
     (c) that solution was found;
     (d) no light joint without limits whirls too fast for the error of the cost; if one whirls
-        fast, the finer solution has to be near a minimum on a still finer grid: see
-        `fault_of_whirling`. Nor is it further away than a radian, with a still finer one as far
-        again: see `fault_of_distance`.
+        fast, the finer solution has a minimum nearby on a still finer grid: see
+        `fault_of_whirling`;
+    (e) without limits, the finer solution is near, or a still finer one is much closer to it: see
+        `fault_of_distance`.
     Solutions of another status are returned unchanged. If the deadline in force passes before
     all of this is known, the status is TIME_LIMIT.
     """
@@ -150,7 +151,7 @@ def _checked(solution: Solution) -> tuple[Solution, str, FinerSolution | None]:
     elif not reason and not _costs_nothing(solution):
         reason = _fault_of_estimate(solution.error_estimate)
     error = None if _costs_nothing(solution) else solution.error_estimate
-    for fault_of in () if reason else (fault_of_whirling, fault_of_distance):
+    for fault_of in (fault_of_whirling, fault_of_distance):
         reason = reason or fault_of(solution, error, finer)
     return solution, reason, finer
 

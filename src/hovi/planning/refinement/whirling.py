@@ -13,11 +13,7 @@ import numpy.typing as npt
 from hovi.discrete.measures.motion_error import relative_difference
 from hovi.errors import HoviError
 from hovi.planning.problem.problem import TrajectoryProblem
-from hovi.planning.refinement.error_estimate import (
-    MAX_FINER_STEPS,
-    FinerSolution,
-    finer_than,
-)
+from hovi.planning.refinement.error_estimate import MAX_FINER_STEPS, FinerSolution, finer_than
 from hovi.planning.solver.solver import Solution, solve_on_grid
 from hovi.planning.solver.status import Status
 from hovi.robot.mass_matrix import MassMatrix
@@ -49,12 +45,12 @@ MAX_WHIRLING_ERROR = 1e-3
 that it was compared with tend to find another motion."""
 MAX_HOPELESS_ERROR = 3e-4
 """The same beyond HOPELESS_RATIO."""
-
 FAR = 1.0
-"""Distance to the finer solution in a coordinate, in [rad] or [m], above which that may be another
-motion along a valley, whose cost says little of the error."""
+"""Distance from a motion to the finer solution in a coordinate, in [rad] or [m], above which the
+two may be different motions along a valley, whose costs say little about the error."""
 CONTRACTION = 0.5
-"""Ratio of the distances to the finer and the finest solution up to which the grids converge."""
+"""Distance from the finer solution to a still finer one, relative to that from the motion to the
+finer one, up to which the grids converge."""
 
 
 @dataclass(frozen=True)
@@ -136,10 +132,10 @@ def whirl(solution: Solution) -> Whirl | None:
 def fault_of_whirling(
     solution: Solution, error: float | None, finer: FinerSolution | None = None
 ) -> str:
-    """Why a minimum is not trusted, as a joint whirls in it; "" if it is, and if none does.
+    """Why a minimum in which a joint whirls is not trusted; "" if it is, or if no joint whirls.
 
-    error: of the cost, relative; None for a cost of rounding. finer: what it was compared with, if
-        that is known.
+    error: relative error of the cost; None if the cost is only rounding. finer: the finer solution
+        that it was compared with; None to compute it.
     """
     assert solution.problem is not None
     whirling = None if solution.problem.limited else whirl(solution)
@@ -152,19 +148,16 @@ def fault_of_whirling(
         return ""
     if _is_confirmed(solution, finer, whirling.largest_error):
         return ""
-    return (
-        f"at {whirling.speed:.3g} rad/s a finer grid confirms it, but a still finer one finds "
-        "another motion"
-    )
+    return f"at {whirling.speed:.3g} rad/s a finer grid confirms it, but a still finer one does not"
 
 
 def fault_of_distance(
     solution: Solution, error: float | None, finer: FinerSolution | None = None
 ) -> str:
-    """Why a minimum without limits is not trusted, as the finer one is FAR away; "" if it is.
+    """Why a minimum without limits whose finer solution is FAR away is not trusted; "" if it is.
 
-    It is where a still finer one is nearer, and with an error below MAX_WHIRLING_ERROR in any case.
-    Arguments as of `fault_of_whirling`.
+    It is trusted if a still finer solution is much closer to the finer one than that is to it, or
+    if its error is at most MAX_WHIRLING_ERROR. The arguments are those of `fault_of_whirling`.
     """
     problem = solution.problem
     assert problem is not None
@@ -175,15 +168,14 @@ def fault_of_distance(
         if finer is None:
             return ""
         far = _distance(solution, finer)
-        known = _finished(finer) if far > FAR else None
-        finest = None if known is None else finer_than(known)
+        if far <= FAR:
+            return ""
+        known, finest = _still_finer(finer)
     except HoviError:
-        return ""
-    if far <= FAR:
         return ""
     if known is not None and finest is not None and _distance(known, finest) <= CONTRACTION * far:
         return ""
-    return f"a finer grid moves it by up to {far:.2g}, and a still finer one as far again"
+    return f"a finer grid moves it by up to {far:.2g}, and a still finer one does not confirm that"
 
 
 def _is_confirmed(solution: Solution, finer: FinerSolution | None, largest: float) -> bool:
@@ -194,15 +186,20 @@ def _is_confirmed(solution: Solution, finer: FinerSolution | None, largest: floa
     """
     try:
         finer = finer or finer_than(solution)
-        known = None if finer is None else _finished(finer)
-        finest = None if known is None else finer_than(known)
+        finest = None if finer is None else _still_finer(finer)[1]
     except HoviError:
         return False
     return finest is not None and relative_difference(finest.known, finest.cost) <= largest
 
 
+def _still_finer(finer: FinerSolution) -> tuple[Solution | None, FinerSolution | None]:
+    """The finer solution as a minimum, and one near it on a still finer grid; None if not found."""
+    known = _finished(finer)
+    return known, None if known is None else finer_than(known)
+
+
 def _finished(finer: FinerSolution) -> Solution | None:
-    """The finer solution as a minimum; None if it leads to none."""
+    """The minimum that the finer solution is, or leads to; None if there is none."""
     known = finer.finish()
     if known is None:
         known = solve_on_grid(finer.problem, finer.path, max_iterations=MAX_FINER_STEPS)
@@ -210,7 +207,7 @@ def _finished(finer: FinerSolution) -> Solution | None:
 
 
 def _distance(solution: Solution, finer: FinerSolution) -> float:
-    """Largest difference of a coordinate at the nodes; 0 on other nodes."""
+    """Largest difference of a coordinate at the nodes, in [rad] or [m]; 0 if the nodes differ."""
     q, other = solution.trajectory.q, finer.path.q
     if q.shape != other.shape:
         return 0.0

@@ -75,9 +75,9 @@ def free_to_tolerance(
 
 
 def _measured(last: BestDuration, before: Accuracy) -> BestDuration:
-    """The motion of a last search, which is not refined, with its own accuracy.
+    """The motion of the last search, which is not refined, with its own accuracy.
 
-    before: of the motion that the search began with.
+    before: accuracy of the motion that the search began with.
     """
     solution = last.solution
     if not solution.success:
@@ -99,9 +99,9 @@ def _measured(last: BestDuration, before: Accuracy) -> BestDuration:
 
 
 def _better(kept: BestDuration, later: BestDuration) -> BestDuration:
-    """A motion within the tolerance, or that of the later round if only that has its best duration.
+    """The motion within the tolerance, or the later one if only that has the best duration.
 
-    The later one failed, or may not be within the tolerance.
+    later: of a round that failed, or whose motion may not be within the tolerance.
     """
     failed = later.solution
     if failed.success and is_best(later) and not is_best(kept):
@@ -111,9 +111,9 @@ def _better(kept: BestDuration, later: BestDuration) -> BestDuration:
 
 def _with_failure(kept: BestDuration, failed: Solution) -> BestDuration:
     """The last motion within the tolerance, with the reason why the next round failed."""
-    reason = str(failed.status) if not failed.success else "the tolerance was not reached again"
     if not kept.solution.success:
         return kept
+    reason = str(failed.status) if not failed.success else "the tolerance was not reached again"
     if failed.status is Status.INTERRUPTED:  # so that the search ends
         kept = kept.unfinished(failed.status, "the search for the best duration was interrupted")
     ending = f"The best duration, found on a coarser grid ({reason} on the finer one), is"

@@ -1,6 +1,6 @@
 """The best duration by one solve for the motion and the duration, where a problem supports that.
 
-And whether it is the best one: only then is the motion a minimum.
+Also whether a duration is the best one: only then is the motion a minimum.
 """
 
 from __future__ import annotations
@@ -37,8 +37,8 @@ LARGEST_SLOPE = 1e-7
 """Largest slope J' + w, relative to w, of a motion that is called a minimum, unless its duration is
 at a bound, at the edge of feasibility or next to a jump of the cost."""
 LARGEST_SLOPE_AT_JUMP = 1e-2
-"""The same next to a jump of the cost, as limits and obstacles cause that act at other instants for
-other durations; the best duration is known to JUMP_BRACKET there."""
+"""The same next to a jump of the cost, where limits or obstacles act at other instants for other
+durations, and the best duration is known only to JUMP_BRACKET."""
 NEXT_STRIDE = 1.001
 """Ratio of the first two durations of a search that begins near the best one."""
 MAX_SEARCHES = 3
@@ -106,9 +106,9 @@ def best_on_its_grid(
     stride: float = MAX_STRIDE,
     jointly: JointSolve | None = None,
 ) -> BestDuration:
-    """As best_duration_by, but a success `is_best`, and UNRESOLVED if no such duration is found.
+    """As `best_duration_by`, but a success `is_best`, and UNRESOLVED if no such duration is found.
 
-    A search that ends elsewhere is repeated from its motion, on the grid of that.
+    A search that ends elsewhere is repeated from its motion, on the grid of that motion.
     """
     found = best_duration_by(free, on_grid(first.trajectory.grid), first, stride, jointly)
     for _ in range(MAX_SEARCHES - 1):
@@ -134,7 +134,7 @@ def is_best(found: BestDuration) -> bool:
 
 
 def unless_best(found: BestDuration, status: Status = Status.UNRESOLVED) -> BestDuration:
-    """The motion, without success unless its duration `is_best`. status: of the last search."""
+    """The motion, as a success only if its duration `is_best`. status: of the last search."""
     if not found.solution.success or is_best(found):
         return found
     slope = found.solution.duration_derivative + found.free.weight

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import field
 from functools import partial
-from typing import Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -35,8 +35,10 @@ from hovi.system.interruption import record_interrupt
 from hovi.system.progress import Progress
 from hovi.workers.lost import Lost
 
+if TYPE_CHECKING:
+    from hovi.planning.solver.methods.interior_point import DistancesAt
+
 Array = npt.NDArray[np.float64]
-Way = Literal["rows", "points"]
 
 STARTS_PER_ROUND = 16
 """Starts per round; constant, so that results do not depend on the number of processes."""
@@ -75,10 +77,12 @@ class Pool:
     deadline: Deadline = field(default_factory=Deadline)
     free: FreeDuration | None = None
 
-    def solve_all(self, guesses: Sequence[DiscretePath], distances: Way | None = None) -> Solved:
+    def solve_all(
+        self, guesses: Sequence[DiscretePath], distances: DistancesAt | None = None
+    ) -> Solved:
         """The solutions from the guesses, without those whose process died.
 
-        distances: how they are bounded, see InteriorPoint; given only where it is the method.
+        distances: where they are bounded, for a single guess with the method InteriorPoint.
         If worker processes cannot be started, the guesses are solved in this one. Raises
         KeyboardInterrupt after an interrupt if there is no solution yet.
         """
@@ -109,7 +113,7 @@ class Pool:
         self,
         guesses: Sequence[DiscretePath],
         results: dict[int, Solution | Lost],
-        distances: Way | None = None,
+        distances: DistancesAt | None = None,
     ) -> None:
         """Add the results that are missing; none of them if the time limit is why."""
         for i, guess in enumerate(guesses):
@@ -137,7 +141,7 @@ def _solve(
     free: FreeDuration | None,
     guess: DiscretePath,
     time_limit: float | None,
-    distances: Way | None = None,
+    distances: DistancesAt | None = None,
 ) -> Solution:
     """The solution from one guess, without the problem, which is not sent."""
     problem, most = job.problem(), job.options.max_iterations
@@ -240,41 +244,42 @@ def explore(
 
 
 def _from_path_or_direct(pool: Pool, first: FirstGuesses, progress: Progress) -> Exploration:
-    """A single start: a path, and the direct guess where that fails.
+    """A single start: the first path, and the direct guess if no solution is found from it.
 
-    Where both fail with rows of distances, both begin again with distances at quadrature points,
-    which take longer than the other guess with rows.
+    If both fail with rows of distances, both are tried again with distances at quadrature points,
+    since that takes longer than the other guess with rows.
     """
     from hovi.planning.solver.methods.interior_point import WITHOUT_MOTION, takes_rows  # 10 ms
 
-    ways: tuple[Way | None, ...] = (None,)
+    ways: tuple[DistancesAt | None, ...] = (None,)
     if pool.free is None and takes_rows(pool.job.problem()):
         ways = "rows", "points"
     guesses = first.paths[0], first.direct
-    tried, lost, stopped = list[tuple[int, Solution]](), list[str](), False
-    failed = {0, 1}  # guesses that another way may help
+    tried, stopped = list[tuple[int, Solution]](), False
+    left = {0, 1}  # guesses that are still worth trying
     for way, i in itertools.product(ways, (0, 1)):
-        if i not in failed:
+        if i not in left:
             continue
         if tried:
-            progress("from the direct guess" if i == 1 else "from the path, at points", 0.5)
+            at_points = ", distances at quadrature points" if way == "points" else ""
+            progress(("from the path", "from the direct guess")[i] + at_points, 0.5)
         try:
-            found = pool.solve_all([guesses[i]], way)
+            found = pool.solve_all([guesses[i]], way)  # a single one in this process
         except KeyboardInterrupt:
             if not tried:
                 raise
             record_interrupt()
             stopped = True
             break
-        tried += [(i, each) for each in found.solutions]
-        lost, stopped = [*lost, *found.lost], found.interrupted
-        if any(each.success for each in found.solutions) or stopped or pool.deadline.passed:
+        solution, stopped = found.solutions[0], found.interrupted
+        tried.append((i, solution))
+        if solution.success or stopped or pool.deadline.passed:
             break
-        if not any(each.status in WITHOUT_MOTION for each in found.solutions):
-            failed.discard(i)
+        if solution.status not in WITHOUT_MOTION:
+            left.discard(i)
     minima = distinct([each for _, each in tried])
     by_path = tuple(each.trajectory for i, each in tried if i == 0)
-    return Exploration(minima, len(tried), stopped, tuple(lost), first, by_path)
+    return Exploration(minima, len(tried), stopped, (), first, by_path)
 
 
 def _round(

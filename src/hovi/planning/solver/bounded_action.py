@@ -198,17 +198,16 @@ class BoundedAction(BoundedObjective[DiscretePath]):
         columns, expansion = model.gather(step), self.action.expansion
         if self.more is None and expansion.charts is None:
             return self._pushed(columns)
-        else:
-            changes = self.ld.point_steps(columns, self.action.coordinates, expansion)
-            parts = []
-            for dx, (_tau, J) in zip(changes, expansion.outputs, strict=True):
-                dtau = np.matmul(J, dx[:, :, None])[:, :, 0]
-                parts.append(np.concatenate([dx, dtau], axis=1))
-            changed = np.concatenate(parts)
-            dy = changed[:, self.columns] * self._inverse_ranges
-            if self.more is not None:
-                dq = changed[:, : self.lagrangian.nv, None]
-                dy = np.concatenate([dy, np.matmul(self._jacobian, dq)[:, :, 0]], axis=1)
+        changes = self.ld.point_steps(columns, self.action.coordinates, expansion)
+        parts = []
+        for dx, (_tau, J) in zip(changes, expansion.outputs, strict=True):
+            dtau = np.matmul(J, dx[:, :, None])[:, :, 0]
+            parts.append(np.concatenate([dx, dtau], axis=1))
+        changed = np.concatenate(parts)
+        dy = changed[:, self.columns] * self._inverse_ranges
+        if self.more is not None:
+            dq = changed[:, : self.lagrangian.nv, None]
+            dy = np.concatenate([dy, np.matmul(self._jacobian, dq)[:, :, 0]], axis=1)
         if self.rows is None or self.rows.size == 0:
             return np.asarray(dy.ravel())
         return np.append(dy, push_rows(self.rows, self._row_columns, columns))

@@ -26,7 +26,6 @@ from hovi.optimize.bounded_objective import Refinement
 from hovi.planning.problem.limits import Limits
 from hovi.planning.solver.limits.limited_coordinates import LimitedCoordinates
 from hovi.planning.solver.limits.limited_parts import LimitedParts
-from hovi.planning.solver.limits.row_forces import RowsAtNodes
 from hovi.robot.space.configuration_space import ConfigurationSpace
 from hovi.schemes.control_points import control_degree, control_nodes, control_rows
 from hovi.schemes.scheme import regular_from_nodal
@@ -34,6 +33,8 @@ from hovi.schemes.scheme import regular_from_nodal
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]
 Mask = npt.NDArray[np.bool_]
+RowsAtNodes = tuple[int, Index, Index, Index, Array]
+"""An order of derivatives, and its rows: numbers, intervals, joints, and values at the nodes."""
 
 WEIGHT = 0.1
 """Weight of a row in a barrier, as a share of the interval."""
@@ -60,7 +61,7 @@ class LimitRows:
     barrier: the last barrier parameter, relative to the mean density of the cost.
 
     bounds: lower and upper ones of the E rows, (E,) each. weights: of the rows in a barrier, (E,),
-    in [s]. at_nodes: see `forces_of`, which keeps it here.
+    in [s]. at_nodes: cache of `forces_of`.
     """
 
     bounds: tuple[Array, Array]
@@ -235,6 +236,7 @@ class LimitRows:
         self._beyond = (rows.table - rows.beside) * scale
 
     def _share_of_intervals(self) -> Array:
+        """The weights."""
         return np.asarray(WEIGHT * self.grid.steps[self.intervals])
 
     def _rows_of(self, parts: LimitedParts) -> _Rows:

@@ -20,12 +20,9 @@ from hovi.schemes.control_points import control_degree, control_nodes
 from hovi.schemes.interval_curve import jet_rows
 
 if TYPE_CHECKING:
-    from hovi.planning.solver.limits.limit_rows import LimitRows
+    from hovi.planning.solver.limits.limit_rows import LimitRows, RowsAtNodes
 
 Array = npt.NDArray[np.float64]
-Index = npt.NDArray[np.intp]
-RowsAtNodes = tuple[int, Index, Index, Index, Array]
-"""An order of derivatives, and its rows: numbers, intervals, joints, and values at the nodes."""
 
 _AT_INSTANTS: WeakKeyDictionary[DiscreteLagrangian, DiscreteLagrangian] = WeakKeyDictionary()
 """The last discrete Lagrangian with further instants of each one, with what it has computed."""

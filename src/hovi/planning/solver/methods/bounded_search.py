@@ -356,7 +356,7 @@ class BoundedSearch:
     def excess(self, path: DiscretePath) -> Array:
         """Excess over lower and upper bounds in every interval, shape (2, N, kinds nv + pairs).
 
-        What rows bound holds by construction: -inf.
+        -inf for what rows bound, which holds by construction.
         """
         trajectory = self.problem.trajectory(path)
         both = excess_of(trajectory, self.limits, self.rows.of.others(self.limits))

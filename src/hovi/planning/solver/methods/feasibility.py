@@ -21,11 +21,7 @@ from hovi.planning.solver.augmented_lagrangian_rounds import first_multipliers
 from hovi.planning.solver.bounded_action import BoundedAction
 from hovi.planning.solver.central_path import CentralPath
 from hovi.planning.solver.clearance_outputs import ClearanceOutputs
-from hovi.planning.solver.methods.bounded_search import (
-    Bounded,
-    BoundedSearch,
-    mean_density,
-)
+from hovi.planning.solver.methods.bounded_search import Bounded, BoundedSearch, mean_density
 from hovi.planning.solver.methods.cleared_motion import cleared_motion
 from hovi.planning.solver.multipliers import Multipliers
 from hovi.planning.solver.penalized_action import LeastViolation, PenalizedAction, least_violation
@@ -59,7 +55,7 @@ WARM_BARRIER, WARM_DECREASE = 1e-7, 3e-7
 """Its barrier parameter, and the predicted decrease at which it ends, relative to the cost: the
 cost exceeds its minimum by less than 1e-6."""
 COMPARED = 1e-4, 5e-3
-"""That decrease where the cost alone is asked for, and how far outputs may be outside then."""
+"""That decrease, and the same as ROOM, where only the cost is wanted."""
 WARM_MARGIN = 1e-6
 """Least distance of its slacks from their bounds."""
 WARM_STEPS = 100
@@ -101,9 +97,10 @@ def _solved_nearby(search: BoundedSearch, path: DiscretePath) -> Bounded | None:
     if not search.options.near or search.clearance is not None or constrained:
         return None
     whole = search.options
-    most = WARM_STEPS if search.near is None else whole.max_iterations
-    most = min(most, whole.max_iterations)  # or a solve from the guess is shorter
-    search.options, along = dataclasses.replace(whole, max_iterations=most), search.along
+    most, along = whole.max_iterations, search.along
+    if search.near is None:  # beyond, a solve from the guess is shorter
+        most = min(WARM_STEPS, most)
+    search.options = dataclasses.replace(whole, max_iterations=most)
     outcome = solved_from(search, path) if along is None else _solved_along(search, along)
     if along is not None and along.rows is None and not outcome.settled:
         search.rows, search.multipliers = search.coarse_rows(), None
@@ -111,7 +108,9 @@ def _solved_nearby(search: BoundedSearch, path: DiscretePath) -> Bounded | None:
         outcome = solved_from(search, path)
     search.options = whole
     left = whole.max_iterations - outcome.iterations
-    if outcome.stop is Stop.ITERATION_LIMIT and outcome.feasible and left > 0:  # it goes on there
+    if (
+        outcome.stop is Stop.ITERATION_LIMIT and outcome.feasible and left > 0
+    ):  # closer than a guess
         search.options = dataclasses.replace(whole, max_iterations=left)
         outcome = search.solve(outcome.x, outcome.barrier)
         search.options = whole
@@ -161,10 +160,10 @@ def _adopt(search: BoundedSearch, along: CentralPath) -> None:
 
 
 def follow(problem: TrajectoryProblem, along: CentralPath, barrier: float) -> CentralPath | None:
-    """The central path of a problem that ends near its solution, which is near that of another one.
+    """The central path of a problem to its solution, as in COMPARED, near that of a similar one.
 
-    Its cost is that of the solution to COMPARED. None where whole Newton steps do not find
-    it, or where time runs out.
+    None where whole Newton steps do not find the solution, or where time runs out.
+    along: central path of the similar problem, on as many intervals.
     barrier: last barrier parameter, relative to the mean density of the cost.
     """
     limits = problem.limits or no_limits(problem.coordinates)
@@ -181,7 +180,8 @@ def _followed(
 ) -> Bounded | None:
     """Follow the solution of a central path by whole Newton steps; None if it is not found so.
 
-    enough: predicted decrease and distance of outputs from their bounds at which it ends.
+    enough: predicted decrease, relative to the cost, and distance of outputs outside their bounds,
+        relative to the range, at which it ends.
     """
     known = along.barrier
     if known is None or search.near is not None or search.problem.constrained:

@@ -26,6 +26,9 @@ from hovi.planning.solver.status import Status, diverged, infeasible_sentence, u
 from hovi.system.deadline import Deadline, OutOfTimeError
 from hovi.system.interruption import record_interrupt
 
+DistancesAt = Literal["rows", "points"]
+"""Where distances are bounded: in rows where pairs come near, or at quadrature points."""
+
 WITHOUT_MOTION = Status.INFEASIBLE, Status.DIVERGED, Status.SADDLE
 """Results of a solve with rows of distances after which one at quadrature points may help."""
 
@@ -45,15 +48,15 @@ class InteriorPoint(Method):
     along: the central path of a similar problem on the same intervals, where it starts; None to
         start from the guess. level: the barrier parameter at which it starts, relative to the mean
         density of the cost; None to infer it from how far the ends have moved.
-    distances: how they are bounded: by "rows" where pairs come near, at quadrature "points", which
-        takes several times as long, or in the second way where the first one fails, if None.
+    distances: where they are bounded: in "rows", or at "points", which takes several times as long;
+        None for rows, and then points if these fail.
     """
 
     def __init__(
         self,
         along: CentralPath | None = None,
         level: float | None = None,
-        distances: Literal["rows", "points"] | None = None,
+        distances: DistancesAt | None = None,
     ) -> None:
         self.along = along
         self.level = level

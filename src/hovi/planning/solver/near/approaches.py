@@ -121,9 +121,9 @@ def approaches_along(
 
 
 def _allowed(d: Array, least: float) -> Mask:
-    """Where distances are less than those of rows by no more than a motion may use up between them.
+    """Where distances are below the least one of rows, but by no more than USED; shape of d.
 
-    A row there would begin outside of its bound, for nothing.
+    A row there would begin outside its bound without need.
     """
     return (d < least) & (d >= least - USED)
 
