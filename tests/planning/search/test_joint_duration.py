@@ -61,6 +61,20 @@ def test_a_free_duration_takes_at_most_three_times_the_steps_of_its_own_value(
     assert "The best duration is" in free.message
 
 
+@pytest.mark.parametrize("weight", [0.0, 1e-3, 1.0])
+def test_a_motion_of_least_cost_has_its_own_duration(weight: float) -> None:
+    """Where time has no price, or nearly none, the slope is small relative to the cost."""
+    scene = hovi.Scene(hovi.load_robot("ur5"), [hovi.effects.Gravity()])
+    start = np.array([0.0, -0.2, 0.3, -0.2, 0.1, 0.0])  # stretched out: every second costs
+    goal = start + np.array([0.8, 0.3, -0.3, 0.2, 0.2, 0.2])
+    limits = {"base": "none", "v": 3.0, "tau": 300.0}
+    free = hovi.plan(scene, start, goal, (0.2, 4.0), time_weight=weight, limits=limits)
+    assert free.success, free.message
+    T = free.trajectory.duration
+    assert 0.21 < T < 3.9
+    assert abs(free.duration_derivative + weight) <= 1e-4 * free.cost / T
+
+
 def test_durations_near_the_best_one_cost_more_within_limits() -> None:
     weight, bounds, _ = SCENES["panda_reach_limited"]
     ends, options = ends_of("panda_reach_limited")

@@ -256,8 +256,9 @@ def _excess_of_bounds(solution: Solution) -> float:
     central = solution.central
     if central is None:
         return 0.0
-    rows = 0.0 if central.rows is None else central.rows.max_loss - MAX_LOSS
-    return rows + BARRIER_EXCESS * central.level
+    rows = central.rows
+    loss = 0.0 if rows is None or rows.size == 0 else rows.max_loss - MAX_LOSS
+    return loss + BARRIER_EXCESS * central.level
 
 
 def error_along(solution: Solution, finer: FinerSolution) -> float:
@@ -276,11 +277,12 @@ def error_along(solution: Solution, finer: FinerSolution) -> float:
 def least_error(solution: Solution) -> float:
     """The least relative error of the cost that can be estimated: see `cost_of_tolerance`.
 
-    Within limits, plus MAX_LOSS: the price of bounding control points instead of the curve.
+    Within limits, plus MAX_LOSS, the price of bounding control points instead of the curve, and
+    what a solve that ended early leaves.
     """
     rows = None if solution.central is None else solution.central.rows
     price = 0.0 if rows is None or rows.size == 0 else MAX_LOSS
-    return max(ROUNDING_FLOOR, cost_of_tolerance(solution)) + price
+    return max(ROUNDING_FLOOR, cost_of_tolerance(solution)) + price + _excess_of_bounds(solution)
 
 
 def contributions(finer: FinerSolution) -> Array:

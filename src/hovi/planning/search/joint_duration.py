@@ -39,6 +39,9 @@ at a bound, at the edge of feasibility or next to a jump of the cost."""
 LARGEST_SLOPE_AT_JUMP = 1e-2
 """The same next to a jump of the cost, where limits or obstacles act at other instants for other
 durations, and the best duration is known only to JUMP_BRACKET."""
+SMALL_WEIGHT, SLOPE_OF_SMALL_WEIGHT = 1e-2, 1e-4
+"""Weight w, relative to J / T, up to which the cost of the motion alone decides, and the largest
+slope then, relative to J / T: a duration longer by one percent costs less by 1e-6 at most."""
 NEXT_STRIDE = 1.001
 """Ratio of the first two durations of a search that begins near the best one."""
 MAX_SEARCHES = 3
@@ -128,9 +131,12 @@ def is_best(found: BestDuration) -> bool:
     """Whether J' + w vanishes, or pushes against a bound, the edge of feasibility or a jump."""
     free = found.free
     slope = found.solution.duration_derivative + free.weight
-    largest = LARGEST_SLOPE_AT_JUMP if found.at_jump else LARGEST_SLOPE
-    small = abs(slope) <= largest * free.weight
-    return small or found.at_edge or _ending(free, found.solution) != ""
+    density = abs(found.solution.cost) / found.solution.trajectory.duration
+    small = free.weight <= SMALL_WEIGHT * density
+    unit, largest = (density, SLOPE_OF_SMALL_WEIGHT) if small else (free.weight, LARGEST_SLOPE)
+    if found.at_jump:
+        largest = LARGEST_SLOPE_AT_JUMP
+    return abs(slope) <= largest * unit or found.at_edge or _ending(free, found.solution) != ""
 
 
 def unless_best(found: BestDuration, status: Status = Status.UNRESOLVED) -> BestDuration:
