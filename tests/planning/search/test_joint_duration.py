@@ -67,8 +67,10 @@ def test_a_motion_of_least_cost_has_its_own_duration(weight: float) -> None:
     scene = hovi.Scene(hovi.load_robot("ur5"), [hovi.effects.Gravity()])
     start = np.array([0.0, -0.2, 0.3, -0.2, 0.1, 0.0])  # stretched out: every second costs
     goal = start + np.array([0.8, 0.3, -0.3, 0.2, 0.2, 0.2])
+    tip = scene.robot.tip_frames[0]
+    point = hovi.FrameGoal(tip, position=scene.robot.frame_position(tip, goal[None])[0])
     limits = {"base": "none", "v": 3.0, "tau": 300.0}
-    free = hovi.plan(scene, start, goal, (0.2, 4.0), time_weight=weight, limits=limits)
+    free = hovi.plan(scene, start, point, (0.2, 4.0), time_weight=weight, limits=limits)
     assert free.success, free.message
     T = free.trajectory.duration
     assert 0.21 < T < 3.9
