@@ -13,6 +13,7 @@ from scipy.optimize import linprog, minimize
 
 from hovi.optimize.barrier import Bounds
 from hovi.optimize.bounded_objective import BoundedObjective, BoundedOutcome, Outputs, Refinement
+from hovi.optimize.bounded_steps import LARGER_DENSITY
 from hovi.optimize.interior_point import minimize_bounded
 from hovi.optimize.quadratic_model import Factor, IntervalSum, QuadraticModel
 from hovi.optimize.trust_region import Options, Stop
@@ -302,6 +303,16 @@ def test_convex_programs_take_few_steps(name: str) -> None:
     program = Program(n, f, y, lower, upper)
     outcome = minimize_bounded(program, np.array(start, dtype=float), Options())
     assert outcome.iterations <= 25
+
+
+@pytest.mark.parametrize("far", [1.0, 10.0, 500.0])
+def test_the_last_barrier_is_relative_to_the_objective_at_the_end(far: float) -> None:
+    """However much more the objective is at the guess."""
+    program = Program(1, lambda x: x[0] ** 2, lambda x: [x[0]], [1.0], [1e9])
+    found = minimize_bounded(program, np.array([1.0 + far]), Options(barrier=1e-6))
+    assert found.stop is Stop.STATIONARY
+    assert found.outputs.value - 1.0 <= 4e-6 * LARGER_DENSITY
+    assert found.barrier.mu <= 1.1e-6 * LARGER_DENSITY
 
 
 def test_multipliers_satisfy_the_optimality_conditions() -> None:

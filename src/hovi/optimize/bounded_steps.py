@@ -26,7 +26,7 @@ CORRECTIONS = 3
 """Maximum number of corrections of outliers in one step."""
 MAX_STRETCH = 1.5
 """Largest length of a corrected step, relative to the radius."""
-LARGER_DENSITY, LEAST_DENSITY = 3.0, 1e-3
+LARGER_DENSITY, LEAST_DENSITY = 3.0, 1e-5
 """Mean density of the objective, relative to the present one, up to which the first one is the unit
 of the last barrier parameter, and the least unit, relative to the first one."""
 LONG_STEP = 0.95
