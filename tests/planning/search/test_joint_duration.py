@@ -61,6 +61,17 @@ def test_a_free_duration_takes_at_most_three_times_the_steps_of_its_own_value(
     assert "The best duration is" in free.message
 
 
+def test_tightened_bounds_that_take_many_steps_give_way_to_halved_intervals() -> None:
+    """With tightened bounds this duration moves for 200 steps, with halved intervals for 12."""
+    ends, options = ends_of("panda_reach_limited")
+    options |= {"intervals": 24}
+    free = hovi.plan(*ends, (0.5, 6.0), time_weight=50.0, **options)
+    assert free.success, free.message
+    assert abs(free.duration_derivative + 50.0) <= 5e-6
+    fixed = hovi.plan(*ends, free.trajectory.duration, **options)
+    assert free.nit <= 4 * fixed.nit
+
+
 @pytest.mark.parametrize("weight", [0.0, 1e-3, 1.0])
 def test_a_motion_of_least_cost_has_its_own_duration(weight: float) -> None:
     """Where time has no price, or nearly none, the slope is small relative to the cost."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import numpy.typing as npt
 
@@ -41,6 +43,9 @@ EXTRA_TIGHTENING = 5.0
 """Additional tightening, in tolerances, to end the rounds early."""
 UNUSED_MARGIN = 1e-3
 """Unused share of a range above which a tightened bound is relaxed again."""
+TIMED_STEPS = 25
+"""Maximum number of steps with tightened bounds where the duration moves, too: from there on halved
+intervals take fewer."""
 MAX_MARGIN = 0.45
 """Maximum share of its range by which a bound is tightened."""
 
@@ -61,7 +66,7 @@ def tightened(search: BoundedSearch, outcome: Bounded) -> tuple[Bounded, str, fl
         finer = halvings < MAX_HALVINGS
         coarse = excess > HALVING_EXCESS or (finer and on_grid > MAX_ROUNDS_PER_GRID)
         again = None if coarse else _solved_tighter(search, outcome, sides)
-        failed = again is None or not (usable(again) or again.stop in STOPPED)
+        failed = again is None or not (_goes_on(search, again) or again.stop in STOPPED)
         if failed and finer:
             halvings, on_grid = halvings + 1, 0
             again, reason = _solved_on_halves(search, outcome, sides)
@@ -83,6 +88,11 @@ def usable(outcome: Bounded) -> bool:
     return outcome.feasible and outcome.stop in (Stop.STATIONARY, Stop.ITERATION_LIMIT)
 
 
+def _goes_on(search: BoundedSearch, outcome: Bounded) -> bool:
+    """Whether bounds may be tightened further; with a free duration, after a minimum alone."""
+    return usable(outcome) and not (search.timed and outcome.stop is Stop.ITERATION_LIMIT)
+
+
 def _solved_tighter(search: BoundedSearch, outcome: Bounded, sides: Array) -> Bounded:
     """Solve again with the bounds tightened in proportion to the excess of the interpolant."""
     factors = _tightening_factors(search, sides)
@@ -96,7 +106,13 @@ def _solved_tighter(search: BoundedSearch, outcome: Bounded, sides: Array) -> Bo
     mu = share * mean_density(outcome.outputs, objective.bounds.measure)
     y, barrier = objective.outputs(outcome.x).y, outcome.barrier
     start = barrier.warm(objective.bounds, y, mu) if len(y) == len(barrier.s) else None
-    return search.solve(outcome.x, start)
+    whole = search.options
+    if search.timed:
+        most = min(TIMED_STEPS, whole.max_iterations)
+        search.options = dataclasses.replace(whole, max_iterations=most)
+    outcome = search.solve(outcome.x, start)
+    search.options = whole
+    return outcome
 
 
 def _tightening_factors(search: BoundedSearch, sides: Array) -> Array:
