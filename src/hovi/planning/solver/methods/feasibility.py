@@ -108,14 +108,13 @@ def _solved_nearby(search: BoundedSearch, path: DiscretePath) -> Bounded | None:
         outcome = solved_from(search, path)
     search.options = whole
     left = whole.max_iterations - outcome.iterations
-    if (
-        outcome.stop is Stop.ITERATION_LIMIT and outcome.feasible and left > 0
-    ):  # closer than a guess
-        search.options = dataclasses.replace(whole, max_iterations=left)
-        outcome = search.solve(outcome.x, outcome.barrier)
-        search.options = whole
-        return outcome if outcome.stop is not Stop.DIVERGED else None
-    return outcome if outcome.settled else None
+    closer = outcome.feasible and outcome.stop is Stop.ITERATION_LIMIT  # than a guess
+    if not closer or left <= 0:
+        return outcome if outcome.settled else None
+    search.options = dataclasses.replace(whole, max_iterations=left)
+    outcome = search.solve(outcome.x, outcome.barrier)
+    search.options = whole
+    return None if outcome.stop is Stop.DIVERGED else outcome
 
 
 def _solved_at_all(search: BoundedSearch, path: DiscretePath) -> Bounded:
