@@ -97,6 +97,26 @@ class Program(BoundedObjective[Array]):
         return x + step
 
 
+class Disc(Program):
+    """From behind a disc to the other side, with a model without the disc's curvature at hand."""
+
+    def __init__(self) -> None:
+        def f(x: ca.SX) -> ca.SX:
+            return (x[0] - 2.0) ** 2 + x[1] ** 2
+
+        super().__init__(2, f, lambda x: [x[0] ** 2 + x[1] ** 2], [1.0], [np.inf])
+        self.convex_models = 0
+
+    def convex_model(self, x: Array) -> QuadraticModel:
+        self.convex_models += 1
+        sigma, rho = self._last
+        return super().model(x, sigma, rho, np.zeros(1))
+
+    def model(self, x: Array, sigma: Array, rho: Array, multipliers: Array) -> QuadraticModel:
+        self._last = sigma, rho
+        return super().model(x, sigma, rho, multipliers)
+
+
 class Quadratic(BoundedObjective[Array]):
     """min x H x / 2 + g x with lower <= A x <= upper, R points of one output in a unit of time."""
 
@@ -320,6 +340,19 @@ def test_multipliers_satisfy_the_optimality_conditions() -> None:
     program = Program(1, lambda x: (x[0] - 3) ** 2, lambda x: [x[0]], [0], [1])
     outcome = minimize_bounded(program, np.array([0.5]), Options())
     assert outcome.barrier.multipliers[0] == pytest.approx(4.0, rel=1e-6)
+
+
+@pytest.mark.parametrize("start", [[-3.0, 0.0], [-3.0, 0.1]])
+def test_a_stationary_point_of_a_model_without_all_of_its_curvature_is_no_end(
+    start: list[float],
+) -> None:
+    disc = Disc()
+    outcome = minimize_bounded(disc, np.array(start), Options())
+    assert disc.convex_models > 2
+    assert outcome.stop is Stop.STATIONARY
+    assert np.allclose(outcome.x, [2.0, 0.0], atol=1e-5)  # not the saddle (-1, 0)
+    assert outcome.model is not None
+    assert outcome.model.factor(0.0) is not None
 
 
 def test_limits_and_interrupts_return_the_current_point() -> None:

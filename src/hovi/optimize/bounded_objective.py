@@ -80,6 +80,13 @@ class BoundedObjective(ABC, Generic[X]):
         multipliers: weights of the outputs' curvature, shape (R,).
         """
 
+    def convex_model(self, x: X) -> QuadraticModel | None:
+        """The last model, at x, without negative curvature of outputs; None if it has none.
+
+        It takes the place of the last model.
+        """
+        return None
+
     @abstractmethod
     def push(self, step: Array, model: QuadraticModel) -> Array:
         """First-order change of the outputs in a step of the last model, shape (R,)."""

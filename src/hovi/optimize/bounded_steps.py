@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from hovi.optimize.barrier import Barrier, Direction, Pair
 from hovi.optimize.bounded_objective import BoundedObjective, BoundedOutcome
-from hovi.optimize.quadratic_model import QuadraticModel
+from hovi.optimize.quadratic_model import QuadraticModel, next_radius
 from hovi.optimize.trust_region import Options, Trial, solve_subproblem
 from hovi.system.dataclass import dataclass
 
@@ -34,6 +34,21 @@ LONG_STEP = 0.95
 SHORTER_SHARES = 0.8, 0.6, 0.4, 0.2, 0.1, 0.03, 0.01, 1e-3
 """Shares of the longest step that are tried: of a plain one as long as they predict more, so that
 it ends away from the bounds; of a corrected one until one of them predicts a decrease."""
+
+ALIKE, MOST_GROWTH = 0.05, 4.0
+"""Relative difference of the actual and the predicted decrease up to which the radius grows by the
+second of these, if the objective reopens; others begin with a radius that is wide enough."""
+SHORT_SHARE = 0.1
+"""Share of a step at the radius below which it was too long for the bounds that cut it."""
+MATCHED = 1e-4
+"""Largest |y - s| at which the radius follows such steps."""
+CUT_RADIUS = 10.0
+"""The largest radius after such a step, relative to what was left of it."""
+LEAST_CUT_RADIUS = 1e-3
+"""The least radius after such a step."""
+SHORTENED = 0.3
+"""Ratio of the radius after such a step while outputs are not matched; its square, where the step
+was refused."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,13 +95,22 @@ class BoundedSteps(Generic[X]):
         self.shift = 0.0
         self.penalty = 0.0
         self.cautious = False
+        self.exact, self.exact_from_now_on = True, False
 
     def model(self) -> QuadraticModel:
-        """The model at the current point, whose multipliers of the bounds steps start from."""
+        """The model at the current point, whose multipliers of the bounds steps start from.
+
+        Where it is not convex, it is without the negative curvature of outputs, and not `exact`.
+        """
         outcome = self.outcome
         sigma, rho, force = outcome.barrier.condensed(outcome.outputs.y)
-        self.sigma, self.rho = sigma, rho
-        return self.objective.model(outcome.x, sigma, rho, force)
+        self.sigma, self.rho, self.exact = sigma, rho, True
+        model = self.objective.model(outcome.x, sigma, rho, force)
+        if self.exact_from_now_on or model.factor(0.0) is not None:
+            return model
+        convex = self.objective.convex_model(outcome.x)
+        self.exact = convex is None
+        return convex or model
 
     def step(self, model: QuadraticModel) -> BoundedStep:
         """A corrected step towards a smaller mu if the model is convex, else a plain one."""
@@ -180,6 +204,22 @@ class BoundedSteps(Generic[X]):
         trial = trial._replace(step=s, norm=math.sqrt(max(norm2, 0.0)))
         change = None if reaction is None else reaction[0]
         return BoundedStep(trial, along, share, predicted, 0.5 * whole, barrier, before, change)
+
+    def next_radius(self, step: BoundedStep, ratio: float) -> float:
+        """The radius after a step, which the bounds may have cut."""
+        norm, last = step.trial.norm, self.radius
+        length = norm * step.share
+        radius, reopens = next_radius(last, length, ratio), self.objective.reopens
+        if reopens and abs(ratio - 1.0) <= ALIKE and length > 0.7 * last:
+            return max(radius, MOST_GROWTH * last)
+        if step.trial.newton or step.share >= SHORT_SHARE:
+            return radius
+        if self.outcome.violation.max(initial=0.0) <= MATCHED:
+            return min(radius, max(CUT_RADIUS * length, LEAST_CUT_RADIUS))
+        if not reopens:
+            return radius
+        # a radius as short as the step would lead nowhere while bounds are not met
+        return min(last, norm) * (SHORTENED if ratio > 1e-4 else SHORTENED**2)
 
     def scale(self) -> float:
         """Magnitude of the objective, to which decreases are relative; positive."""

@@ -15,6 +15,10 @@ exact penalty of |y - s|; the model keeps the barrier as it is and linearises y 
 step fails, mu stays until its problem is solved. [WaechterBiegler2006; NocedalWright2006, chapter
 19]
 
+Where the Hessian is indefinite, the objective may give a model without the negative curvature of
+outputs, with which mu falls sooner. At a stationary point, and from there on, the model is exact:
+saddles are left.
+
 An objective may replace outputs by looser ones as mu falls: bounds that hold at all times are
 imposed on outputs close to the motion, the closer the smaller mu.
 """
@@ -36,8 +40,8 @@ from hovi.optimize.bounded_objective import (
     BoundedOutcome,
     Refinement,
 )
-from hovi.optimize.bounded_steps import BoundedStep, BoundedSteps
-from hovi.optimize.quadratic_model import QuadraticModel, decrease_ratio, next_radius, next_shift
+from hovi.optimize.bounded_steps import SHORT_SHARE, BoundedStep, BoundedSteps
+from hovi.optimize.quadratic_model import QuadraticModel, decrease_ratio, next_shift
 from hovi.optimize.trust_region import Iteration, Options, Stop
 from hovi.system.deadline import raise_if_late
 from hovi.system.interruption import raise_if_interrupted
@@ -61,32 +65,21 @@ they are and to the mean density, and its largest value, relative to the mean de
 LEAST_REOPENED, LARGEST_REOPENED, MAX_REOPENINGS = 1e-5, 0.1, 6
 """Where outputs may be missed for a while: the least such parameter, the largest |y - s| at which
 slacks are moved away from their bounds instead of ending as diverged, and how many times."""
+SADDLE_LEVEL, SADDLE_MARGIN = 1e-2, 1e-3
+"""Barrier parameter, relative to the mean density, and least distance of slacks from their bounds,
+relative to the range, with which a solve goes on from a saddle that an inexact model led to."""
 REOPENED_LEVEL = 0.3
 """The least such parameter, relative to the mean product of multipliers and gaps."""
 MARKED_AGAIN = 1.5
 """Product up to which a later point takes the place of a marked one, relative to its first."""
 MAX_REFINEMENTS = 40
 """Maximum number of refinements."""
-ALIKE, MOST_GROWTH = 0.05, 4.0
-"""Relative difference of the actual and the predicted decrease up to which the radius grows by the
-second of these, if the objective reopens; others begin with a radius that is wide enough."""
-SHORT_SHARE = 0.1
-"""Share of a step at the radius below which it was too long for the bounds that cut it."""
 CUT_SHARE, MOST_CUT, RAISED = 0.5, 4, 10.0
 """Share of a step below which the bounds cut it where the model is not convex (SHORT_SHARE where it
 is), the number of such steps in a row after which the barrier parameter is raised, since it has
 fallen too early, and the factor by which it is raised."""
 LEAST_RAISED_GAP = 1e-9
 """Least distance of slacks from their bounds after that, relative to the range."""
-MATCHED = 1e-4
-"""Largest |y - s| at which the radius follows such steps."""
-CUT_RADIUS = 10.0
-"""The largest radius after such a step, relative to what was left of it."""
-LEAST_CUT_RADIUS = 1e-3
-"""The least radius after such a step."""
-SHORTENED = 0.3
-"""Ratio of the radius after such a step while outputs are not matched; its square, where the step
-was refused."""
 MOST_HANDED = 5e-3
 """How far outside its bounds a new output may be that takes over the forces of those beside it."""
 OUTSIDE_RADIUS = 3.0
@@ -177,9 +170,11 @@ class _Iteration(BoundedSteps[X]):
             if self.objective.blocked:
                 return
             if finished and not refined:
-                self.outcome.stop = Stop.STATIONARY
-                self.outcome.model = self.model()
-                return
+                if self.exact:
+                    self.outcome.stop, self.outcome.model = Stop.STATIONARY, self.model()
+                    return
+                model = self._made_exact()
+                continue
             if self._is_hopeless():
                 if not self._reopened():
                     self.outcome.stop = Stop.DIVERGED
@@ -212,7 +207,7 @@ class _Iteration(BoundedSteps[X]):
         if self.report is not None:
             self.report(outcome.iterations, outputs.value)
         length = trial.norm * step.share
-        last, radius = self.radius, self._next_radius(step, ratio)
+        last, radius = self.radius, self.next_radius(step, ratio)
         self.shift = next_shift(trial.shift, trial.norm, radius)
         self.radius = radius
         short = length < SHORT_LENGTH * max(1.0, radius)
@@ -237,22 +232,6 @@ class _Iteration(BoundedSteps[X]):
         self.violations.append(float(outcome.violation.max(initial=0.0)))
         self._mark(x)
         return True
-
-    def _next_radius(self, step: BoundedStep, ratio: float) -> float:
-        """The radius after a step, which the bounds may have cut."""
-        norm, last = step.trial.norm, self.radius
-        length = norm * step.share
-        radius, reopens = next_radius(last, length, ratio), self.objective.reopens
-        if reopens and abs(ratio - 1.0) <= ALIKE and length > 0.7 * last:
-            return max(radius, MOST_GROWTH * last)
-        if step.trial.newton or step.share >= SHORT_SHARE:
-            return radius
-        if self.outcome.violation.max(initial=0.0) <= MATCHED:
-            return min(radius, max(CUT_RADIUS * length, LEAST_CUT_RADIUS))
-        if not reopens:
-            return radius
-        # a radius as short as the step would lead nowhere while bounds are not met
-        return min(last, norm) * (SHORTENED if ratio > 1e-4 else SHORTENED**2)
 
     def _hold(self, reaction: Array | None, sign: float) -> float:
         """Change multipliers of equations by a step's, or take it back; returns what that adds."""
@@ -287,14 +266,30 @@ class _Iteration(BoundedSteps[X]):
         self.reopenings += 1
         level = REOPENED_LEVEL * self.product / self.density
         share = max(min(REOPENED * outside, MOST_REOPENED), LEAST_REOPENED, level)
-        mu, margin = share * self.density, max(REOPENED * outside, LEAST_REOPENED)
-        bounds, y = objective.bounds, outcome.outputs.y
+        self._move_inside(share * self.density, max(REOPENED * outside, LEAST_REOPENED))
+        return True
+
+    def _made_exact(self) -> QuadraticModel:
+        """The exact model at a stationary point of another one, from now on.
+
+        If that is a saddle, slacks are moved away from their bounds: at them it is hardly left.
+        """
+        self.exact_from_now_on = True
+        model = self.model()
+        if model.factor(0.0) is None:
+            self._move_inside(SADDLE_LEVEL * self.density, SADDLE_MARGIN)
+            model = self.model()
+        return model
+
+    def _move_inside(self, mu: float, margin: float) -> None:
+        """Move slacks away from their bounds, with a barrier parameter to go on with."""
+        outcome = self.outcome
+        bounds, y = self.objective.bounds, outcome.outputs.y
         outcome.barrier = Barrier.central(bounds, y, mu, outcome.barrier.scale, margin)
         self.product = outcome.barrier.mean_product()
         self.penalty, self.shift, self.radius = 0.0, 0.0, max(self.radius, 1.0)
         self.stalled, self.cautious = 0, self.plain
         self.violations.clear()
-        return True
 
     def _finished(self, step: BoundedStep, accepted: bool) -> bool:
         """Whether the last step, of the last mu, predicts next to nothing for its whole length."""

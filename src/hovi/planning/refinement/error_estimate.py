@@ -38,7 +38,7 @@ Array = npt.NDArray[np.float64]
 
 LIMITED_SAFETY_FACTOR = 3.0
 """Factor on estimates under limits, where the finer solution is not much better."""
-RICHER_LEVEL = 1e-3
+RICHER_LEVEL = 3e-4
 """Barrier parameter at which a solve with more modes begins within limits."""
 RICHER_BARRIER = 1e-7
 """Its least last barrier parameter, whose share of the cost is less than errors that can be told.

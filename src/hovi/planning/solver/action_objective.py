@@ -233,9 +233,13 @@ class ActionObjective(Objective[DiscretePath]):
             self._add_conditions(x, self._expansion, multipliers)
             if self.moments is not None:
                 self.moments.add_squares(self._expansion, multipliers.torque_penalty)
+        return self.model_of_expansion()
+
+    def model_of_expansion(self) -> QuadraticModel:
+        """The model of the last expansion, to which more may have been added since."""
         intervals = IntervalSum(
-            self._expansion.gradient,
-            self._expansion.hessian,
+            self.expansion.gradient,
+            self.expansion.hessian,
             self.structure.metric[self.coordinates],
         )
         if self.algebra == "band":

@@ -136,6 +136,10 @@ class BoundedAction(BoundedObjective[DiscretePath]):
         if self.more is not None:
             terms = self._with_more(x, terms, sigma_at, rho_at, multipliers_at)
         model = self.action.model_with(x, curvatures, terms, self._row_terms(sigma, rho))
+        return self._under_conditions(x, model)
+
+    def _under_conditions(self, x: DiscretePath, model: QuadraticModel) -> QuadraticModel:
+        """The model, whose steps meet conditions at nodes to first order if they are to."""
         if self.node_tolerance is None or not isinstance(model, BandModel):
             return model
         return self.action.under_conditions(x, model)

@@ -172,6 +172,45 @@ def test_a_second_look_at_the_same_motion_adds_nothing() -> None:
     assert rows.hidden_depth(path) <= 0.0
 
 
+@pytest.mark.parametrize("name", ROBOTS)
+def test_what_is_known_of_earlier_motions_holds_after_rows_were_added_and_sharpened(
+    name: str,
+) -> None:
+    problem = problem_of(name)
+    paths = [wavy(problem, seed) for seed in range(4)]
+    rows = rows_of(problem, paths[0], 0.15)
+    first = rows.size
+    for path in paths[1:]:
+        rows.values(path)
+        rows.hidden_depth(path)
+    assert rows.extend(problem, paths[1], 0.5) > 0
+    rows._round(np.where(np.arange(rows.size) % 2 == 0, rows.rounding, LEAST_ROUNDING))
+    fresh = rows.on(problem)
+    assert rows.size > first
+    for path in paths:
+        assert np.allclose(rows.values(path), fresh.values(path), atol=1e-9)
+        assert np.isclose(rows.hidden_depth(path), fresh.hidden_depth(path), atol=1e-9)
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_curvature_without_its_negative_part_is_the_nearest_convex_one(name: str) -> None:
+    problem = problem_of(name)
+    path = wavy(problem)
+    rows = rows_of(problem, path, 0.2)
+    force = np.random.default_rng(0).uniform(-1.0, 0.5, rows.size)
+    expanded = rows.expanded(path, force, "nodal")
+    convex = expanded.without_negative_curvature()
+    assert convex is not None
+    size = np.abs(expanded.curvature).max()
+    values = np.linalg.eigvalsh(expanded.curvature)
+    assert values.min() < -1e-3 * size
+    assert np.linalg.eigvalsh(convex.curvature).min() >= -1e-12 * size
+    rest = np.linalg.eigvalsh(convex.curvature - expanded.curvature)
+    expected = np.sort(np.maximum(-values, 0.0), axis=1)
+    assert np.allclose(rest, expected, atol=1e-12 * size)
+    assert convex.without_negative_curvature() is None or (values > 0).any()
+
+
 def test_thinned_rows_are_those_of_near_pairs() -> None:
     problem = problem_of("ur5")
     path = wavy(problem)

@@ -63,6 +63,31 @@ def test_the_gradient_is_that_of_the_action_and_the_forces() -> None:
     assert pulled == pytest.approx(float((action.bounds.weights * force) @ pushed), rel=1e-9)
 
 
+def test_a_convex_model_lacks_the_negative_curvature_of_distances_alone() -> None:
+    problem = problem_of("ur5")
+    path = wavy(problem)
+    action = action_of(problem, path, 0.1)
+    count = len(action.bounds.lower)
+    none, pushed_away = np.zeros(count), np.zeros(count)
+    pushed_away[-action.near.size :] = -1e6
+    model = action.model(path, none, none, pushed_away)
+    assert model.factor(0.0) is None
+    gradient, hessian = model.gradient, model.intervals.hessian.copy()
+    near = action._near
+    convex = action.convex_model(path)
+    assert convex is not None
+    assert near is not None
+    np.testing.assert_array_equal(convex.gradient, gradient)
+    values, vectors = np.linalg.eigh(near.curvature)
+    negative = (vectors * np.minimum(values, 0.0)[:, None]) @ vectors.transpose(0, 2, 1)
+    near.add_at_instants(negative, convex.intervals.hessian)  # what it lacks
+    size = np.abs(hessian).max()
+    np.testing.assert_allclose(convex.intervals.hessian, hessian, atol=1e-12 * size)
+    pushed_away[-action.near.size :] = 0.0
+    action.model(path, none, none, pushed_away)
+    assert action.convex_model(path) is None
+
+
 def test_rows_that_are_watched_refuse_a_step_into_a_pair_before_there_are_any() -> None:
     problem = problem_of("ur5")
     path = wavy(problem)

@@ -32,10 +32,12 @@ from hovi.planning.solver.near.approaches import (
     spread_approaches,
 )
 from hovi.planning.solver.near.expanded_rows import ExpandedRows, RowSums
+from hovi.planning.solver.near.recent_paths import RecentPaths
 from hovi.scene.lagrangian import PointTerms
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]
+Mask = npt.NDArray[np.bool_]
 
 ROUNDED_SHARE, LEAST_ROUNDING, MOST_ROUNDING = 0.1, 2e-5, 1e-3
 """Size by which the shapes of a row are rounded, as a share of what the row is above its bound, and
@@ -73,8 +75,8 @@ class ClearanceRows:
         self.probing = self.blocked = self.watchful = False
         self.order: Index = np.zeros(0, dtype=np.intp)
         self._followed: LimitRows | None = None
-        self._seen: tuple[DiscretePath, Array] | None = None
-        self._last: tuple[DiscretePath, Array] | None = None
+        self._problem, self._spread = problem, RecentPaths[Array]()
+        self._measured = RecentPaths[Array]()
         none = np.zeros(0, dtype=np.intp)
         self._set(problem, none, np.zeros(0), none, np.zeros(0))
 
@@ -106,15 +108,26 @@ class ClearanceRows:
         return saturated(self._excess(path))[0]
 
     def _excess(self, path: DiscretePath) -> Array:
-        """What distances exceed the least one by, shape (E,); those of the last path are kept."""
-        if self.size == 0:
-            return np.zeros(0)
-        if self._last is None or self._last[0] is not path:
-            q = self._configurations(path)
-            d = self._some.values(q, self._reach, self._wanted, self._sizes)
-            beyond = (d[self._instant, self._column] - self.least) / DISTANCE_SCALE
-            self._last = path, beyond
-        return self._last[1]
+        """What distances exceed the least one by, shape (E,); those of the last paths are kept."""
+        known = self._measured.known(path)
+        beyond = np.full(self.size, np.nan) if known is None else known
+        unknown = np.isnan(beyond)
+        if unknown.any():
+            beyond = np.where(unknown, self._measured_excess(path, unknown), beyond)
+            self._measured = self._measured.with_entry(path, beyond)
+        return beyond
+
+    def _measured_excess(self, path: DiscretePath, chosen: Mask) -> Array:
+        """What distances exceed the least one by in chosen rows, (E,); NaN in others."""
+        instants, place = np.unique(self._instant[chosen], return_inverse=True)
+        column = self._column[chosen]
+        wanted = np.zeros((len(instants), self._wanted.shape[1]), dtype=bool)
+        wanted[place, column] = True
+        q, sizes = self._configurations(path)[instants], self._sizes[instants]
+        d = self._some.values(q, self._reach, wanted, sizes)
+        beyond = np.full(self.size, np.nan)
+        beyond[chosen] = (d[place, column] - self.least) / DISTANCE_SCALE
+        return beyond
 
     def expanded(self, path: DiscretePath, force: Array, coordinates: Coordinates) -> ExpandedRows:
         """The rows with their derivatives. force: weights of their curvature, shape (E,)."""
@@ -185,7 +198,7 @@ class ClearanceRows:
         """
         kept = self.values(path) <= within / DISTANCE_SCALE
         rows = copy.copy(self)
-        rows._followed, rows.guard = None, 0.5 * within
+        rows._followed, rows.guard, rows._spread = None, 0.5 * within, RecentPaths()
         some = self.intervals[kept], self.positions[kept], self.pairs[kept], self.rounding[kept]
         rows._set(self._problem, *some)
         limits = len(self.order) - self.size
@@ -213,11 +226,13 @@ class ClearanceRows:
 
     def _spread_distances(self, path: DiscretePath) -> Array:
         """Distances of all pairs at positions spread over the motion, (N SPREAD + 1, K)."""
-        if self._seen is None or self._seen[0] is not path:
+        d = self._spread.known(path)
+        if d is None:
             batch = spread(self._problem, SPREAD)
             q = self.distances.at(configurations(self._problem, path, batch), batch.t)
-            self._seen = path, self.distances.values(q, self.least + self.guard)
-        return self._seen[1]
+            d = self.distances.values(q, self.least + self.guard)
+            self._spread = self._spread.with_entry(path, d)
+        return d
 
     def take(self, parts: Sequence[tuple[int, ClearanceRows]]) -> None:
         """Take the rows of parts of the motion: the number of their first interval, and rows."""
@@ -236,7 +251,10 @@ class ClearanceRows:
         added = len(found.pairs)
         self.handed = self._beside(found)
         rounding = np.append(self.rounding, np.full(added, LEAST_ROUNDING))
+        before = self._measured if problem is self._problem else RecentPaths[Array]()
         self._set(problem, intervals, positions, pairs, rounding)
+        self._measured = before.mapped(lambda known: np.append(known, np.full(added, np.nan)))
+        rounding = rounding.copy()
         rounding[-added:] = _rounding_of(self.values(path)[-added:])
         self._round(rounding)
         self.order = np.append(self.order, len(self.order) + np.arange(added))
@@ -266,26 +284,32 @@ class ClearanceRows:
         rounding: Array,
     ) -> None:
         """Take rows: their intervals, positions in these, numbers of pairs, and rounding, (E,)."""
+        if problem is not self._problem:
+            self._spread = RecentPaths()
         self.grid: Grid = problem.grid
-        self._problem = problem
+        self._problem, self._measured = problem, RecentPaths()
         self.intervals, self.positions, self.pairs = intervals, positions, pairs
         at, self._instant = np.unique(intervals + 1j * positions, return_inverse=True)
         chosen, self._column = np.unique(pairs, return_inverse=True)
         self._some = self.distances.restricted(chosen.tolist())
         self._wanted = np.zeros((len(at), len(chosen)), dtype=bool)
         self._wanted[self._instant, self._column] = True
-        self._round(rounding)
+        self._take_rounding(rounding)
         self._sums = RowSums.of(at.real.astype(np.intp), self._instant)
         number = problem.grid.intervals * SPREAD + 1
         self._watched = np.tile(free_ones(problem, number)[:, None], (1, len(self.distances.pairs)))
         self._watched[np.rint((intervals + positions) * SPREAD).astype(np.intp), pairs] = False
-        self._seen = None
         k, s = at.real.astype(np.intp), np.ascontiguousarray(at.imag)
         self._batch = InstantBatch(self.grid, k, s, np.ones(len(k)))
 
     def _round(self, rounding: Array) -> None:
-        """Take sizes by which the shapes of rows are rounded, (E,), in [m]."""
-        self.rounding, self._last = rounding, None
+        """Round the shapes of rows by other sizes, (E,), in [m]; these rows are measured again."""
+        changed = rounding != self.rounding
+        self._measured = self._measured.mapped(lambda known: np.where(changed, np.nan, known))
+        self._take_rounding(rounding)
+
+    def _take_rounding(self, rounding: Array) -> None:
+        self.rounding = rounding
         self._sizes = np.zeros(self._wanted.shape)
         self._sizes[self._instant, self._column] = rounding
 

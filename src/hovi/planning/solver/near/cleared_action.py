@@ -94,6 +94,16 @@ class ClearedAction(BoundedAction):
             self._near = self.near.expanded(x, force, self.action.coordinates)
         return super().model(x, sigma, rho, multipliers)
 
+    def convex_model(self, x: DiscretePath) -> QuadraticModel | None:
+        """See BoundedObjective.convex_model: with the positive part of the rows' curvature."""
+        near = self._near
+        convex = None if near is None else near.without_negative_curvature()
+        if near is None or convex is None:
+            return None
+        convex.add_at_instants(convex.curvature - near.curvature, self.action.expansion.hessian)
+        self._near = convex
+        return self._under_conditions(x, self.action.model_of_expansion())
+
     def _row_terms(self, sigma: Array, rho: Array) -> Callable[[Expansion], None] | None:
         """What adds the terms of all rows to an expansion."""
         first = self._limit_count

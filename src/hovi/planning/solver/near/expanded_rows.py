@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import numpy.typing as npt
 
@@ -58,6 +60,14 @@ class ExpandedRows:
     jacobian: Array
     curvature: Array
 
+    def without_negative_curvature(self) -> ExpandedRows | None:
+        """The same with the positive part of the curvature at every instant; None if that is it."""
+        values, vectors = np.linalg.eigh(self.curvature)
+        if (values >= 0.0).all():
+            return None
+        scaled = vectors * np.maximum(values, 0.0)[:, None]
+        return dataclasses.replace(self, curvature=scaled @ vectors.transpose(0, 2, 1))
+
     def push(self, columns: Array) -> Array:
         """The change of y in a step of the intervals' columns (N, m, n), shape (E,)."""
         dq = np.matmul(self.table[:, None], columns[self.sums.intervals])[:, 0]
@@ -72,8 +82,11 @@ class ExpandedRows:
         """Add the weighted squares of rows' changes, and the curvature, to (N, m, m, n, n)."""
         J = self.jacobian
         squares = (weights[:, None] * J)[:, :, None] * J[:, None]
-        at = self.sums.by_instant(squares) + self.curvature
-        T, n = self.table, J.shape[1]
+        self.add_at_instants(self.sums.by_instant(squares) + self.curvature, hessian)
+
+    def add_at_instants(self, at: Array, hessian: Array) -> None:
+        """Add second derivatives in the configurations at the instants, (M, nv, nv), to those."""
+        T, n = self.table, self.jacobian.shape[1]
         both = (T[:, :, None] * T[:, None]).reshape(len(T), -1)
         ends = [*self.sums.begin[1:].tolist(), len(T)]
         for k, first, end in zip(self.sums.numbers, self.sums.begin, ends, strict=True):
