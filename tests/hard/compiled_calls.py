@@ -538,7 +538,7 @@ def _hulls_fit(lists: dict[str, list[Any]]) -> bool:
 _CHOSEN = {
     **{"q": _in("P q"), "chosen": _in("k", "int64")},
     **{"distances": _out("P k"), "known": Kind("P k", "int64", output=True)},
-    **{"wanted": _in("P k", "bool"), "rounding": _in("P k")},
+    **{"wanted": _in("P k", "bool"), "rounding": _in("P k"), "normals": _updated("P k 3")},
 }
 
 
@@ -911,7 +911,7 @@ ENTRIES: dict[str, Entry] = {
         lambda **arguments: pair_distances().values(**arguments),
         _CHOSEN,
         {"reach": 0.5},
-        optional=("wanted", "rounding"),
+        optional=("wanted", "rounding", "normals"),
         **_PAIRS,
     ),
     "distances.expand": Entry(
@@ -921,7 +921,7 @@ ENTRIES: dict[str, Entry] = {
             **{"jacobian": _out("P k n"), "curvature": _out("P n n")},
         },
         {"reach": 0.5},
-        optional=("force", "wanted", "rounding"),
+        optional=("force", "wanted", "rounding", "normals"),
         **_PAIRS,
     ),
     "symbolic.frame_placement": Entry(

@@ -180,20 +180,34 @@ inline bool is_round(const Placed& placed) {
   return placed.first->kind == ShapeKind::cylinder || placed.second->kind == ShapeKind::cylinder;
 }
 
+inline void write_normal(const Vector& n, double* out) {
+  out[0] = n.x;
+  out[1] = n.y;
+  out[2] = n.z;
+}
+
 // The distance of a pair, by its bounding spheres if they are far apart; the contact otherwise.
+// normal: see Request, or null.
 inline Known measure_pair(const Model& model, const Pair& pair, const Workspace& work, double reach,
-                          double rounding, Memory& memory, Contact& contact, double& distance) {
+                          double rounding, double* normal, Memory& memory, Contact& contact,
+                          double& distance) {
   distance = lower_bound(model, pair, work, memory, reach);
   if (distance > reach) return Known::far;
   const Shape &first = model.shape[pair.first], &second = model.shape[pair.second];
   if (first.kind == ShapeKind::other || second.kind == ShapeKind::other) return Known::not_at_all;
+  const double radii = first.radius + second.radius;
+  const Placed placed{&first, &second, work.shape[pair.first], work.shape[pair.second]};
+  if (rounding > 0.0 && normal && round_off_from(model, placed, rounding, normal, contact)) {
+    write_normal(contact.n, normal);
+    distance = contact.distance - radii;
+    return distance > reach ? Known::far : Known::exactly;
+  }
+  if (normal) write_normal({0.0, 0.0, 0.0}, normal);
   Simplex simplex;
   for (std::size_t i = 0; i < memory.points; ++i)
     simplex.add(memory.first[i], memory.second[i], {0.0, 0.0, 0.0});
   simplex.last_first = memory.last_first;
   simplex.last_second = memory.last_second;
-  const double radii = first.radius + second.radius;
-  const Placed placed{&first, &second, work.shape[pair.first], work.shape[pair.second]};
   const bool round = is_round(placed);
   const double core_reach = reach + radii;
   double bound = 0.0;
@@ -216,6 +230,7 @@ inline Known measure_pair(const Model& model, const Pair& pair, const Workspace&
   if (known == Known::exactly && rounding > 0.0) {
     round_off(model, placed, rounding, contact);
     distance = contact.distance - radii;
+    if (normal && contact.rounded) write_normal(contact.n, normal);
   }
   return known;
 }
@@ -258,8 +273,9 @@ void measure(const Model& model, const Request& request, const Answer& answer, d
       answer.distance[at] = request.reach;
       if (!request.wanted || request.wanted[at])
         known = measure_pair(model, pair, work, request.reach,
-                             request.rounding ? request.rounding[at] : 0.0, work.memory[k], contact,
-                             answer.distance[at]);
+                             request.rounding ? request.rounding[at] : 0.0,
+                             request.normals ? request.normals + 3 * at : nullptr, work.memory[k],
+                             contact, answer.distance[at]);
       answer.known[at] = static_cast<std::int64_t>(known);
       if (!answer.jacobian) continue;
       double* const slope = answer.jacobian + at * nv;

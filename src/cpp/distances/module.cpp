@@ -166,7 +166,7 @@ Request request_of(const PairDistances& self, const Input<2>& q, const Index& ch
   const std::size_t pairs = chosen.shape(0);
   for (std::size_t k = 0; k < pairs; ++k)
     natural("chosen", chosen.data()[k], static_cast<std::int64_t>(self.size()));
-  return {points, q.data(), pairs, chosen.data(), reach, nullptr, nullptr, nullptr};
+  return {points, q.data(), pairs, chosen.data(), reach, nullptr, nullptr, nullptr, nullptr};
 }
 
 const double* rounding_of(const std::optional<Input<2>>& rounding, std::size_t points,
@@ -180,10 +180,12 @@ const double* rounding_of(const std::optional<Input<2>>& rounding, std::size_t p
 void values(const PairDistances& self, const Input<2>& q, const Index& chosen, double reach,
             const Output<2>& distances, const IndexOut2& known,
             const std::optional<Mask2>& wanted,
-            const std::optional<Input<2>>& rounding) {
+            const std::optional<Input<2>>& rounding,
+            const std::optional<Output<3>>& normals) {
   Request request = request_of(self, q, chosen, reach);
   request.wanted = data_or_null("wanted", wanted, {request.points, request.pairs});
   request.rounding = rounding_of(rounding, request.points, request.pairs);
+  request.normals = data_or_null("normals", normals, {request.points, request.pairs, 3});
   distances.require("distances", {request.points, request.pairs});
   known.require("known", {request.points, request.pairs});
   const nb::gil_scoped_release released;
@@ -194,10 +196,12 @@ void expand(const PairDistances& self, const Input<2>& q, const Index& chosen, d
             const std::optional<Input<2>>& force, const Output<2>& distances,
             const IndexOut2& known, const Output<3>& jacobian, const Output<3>& curvature,
             const std::optional<Mask2>& wanted,
-            const std::optional<Input<2>>& rounding) {
+            const std::optional<Input<2>>& rounding,
+            const std::optional<Output<3>>& normals) {
   Request request = request_of(self, q, chosen, reach);
   const std::size_t P = request.points, K = request.pairs, nv = self.nv();
   request.rounding = rounding_of(rounding, P, K);
+  request.normals = data_or_null("normals", normals, {P, K, 3});
   request.force = data_or_null("force", force, {P, K});
   request.wanted = data_or_null("wanted", wanted, {P, K});
   distances.require("distances", {P, K});
@@ -221,8 +225,8 @@ NB_MODULE(distances, m) {
       .def_prop_ro("nv", &PairDistances::nv)
       .def_prop_ro("size", &PairDistances::size)
       .def("values", &values, "q"_a, "chosen"_a, "reach"_a, "distances"_a, "known"_a,
-           "wanted"_a = nb::none(), "rounding"_a = nb::none())
+           "wanted"_a = nb::none(), "rounding"_a = nb::none(), "normals"_a = nb::none())
       .def("expand", &expand, "q"_a, "chosen"_a, "reach"_a, "force"_a.none(), "distances"_a,
            "known"_a, "jacobian"_a, "curvature"_a, "wanted"_a = nb::none(),
-           "rounding"_a = nb::none());
+           "rounding"_a = nb::none(), "normals"_a = nb::none());
 }

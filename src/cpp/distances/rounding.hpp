@@ -24,7 +24,7 @@ namespace {
 constexpr double most_below = 25.0;
 constexpr int rounding_steps = 40, rounding_halvings = 20;
 // Step of n at which Newton's method ends: what remains is of the order of its square over eps.
-constexpr double rounding_step = 1e-10;
+constexpr double rounding_step = 1e-7;
 // Vertices that may gain weight while n turns by less than this are looked at: by less of a turn
 // where these are too many, and by more of one where n turns further.
 constexpr double first_turn = 0.02, most_turn = 0.3;
@@ -100,19 +100,23 @@ inline bool find_candidates(const Model& model, const Shape& shape, const Vector
   if (shape.kind == ShapeKind::cylinder) return true;
   if (shape.linked && shape.count > most_scanned && shape.count < 64 * mark_words)
     return find_connected(model, shape, n, eps, turn, out);
-  double top = -__builtin_inf();
-  Vector highest{};
-  for (std::size_t i = shape.first; i < shape.first + shape.count; ++i) {
-    const double height = along(model, i, n);
-    if (height > top) top = height, highest = {model.x[i], model.y[i], model.z[i]};
-  }
-  for (std::size_t i = shape.first; i < shape.first + shape.count; ++i) {
-    const double below = top - along(model, i, n) - most_below * eps;
-    const Vector v{model.x[i], model.y[i], model.z[i]}, w = v - highest;
-    if (!may_count(below, w, turn)) continue;
-    if (out.count > 0 && same(v, out.point[out.count - 1])) continue;  // a copy
-    if (out.count == most_candidates) return false;
-    out.point[out.count++] = v;
+  const double *x = model.x + shape.first, *y = model.y + shape.first, *z = model.z + shape.first;
+  const std::size_t first = farthest_of_all(model, shape, n);
+  const Vector highest{x[first], y[first], z[first]};
+  const Pack nx = broadcast(n.x), ny = broadcast(n.y), nz = broadcast(n.z);
+  const Pack least = broadcast(dot(highest, n) - most_below * eps), square = broadcast(turn * turn);
+  for (std::size_t i = 0; i < shape.count; i += lanes) {
+    const Pack px = load(x + i), py = load(y + i), pz = load(z + i);
+    const Pack below = least - (px * nx + py * ny + pz * nz);  // see may_count
+    const Pack wx = px - highest.x, wy = py - highest.y, wz = pz - highest.z;
+    const auto counts = below <= 0.0 || below * below <= square * (wx * wx + wy * wy + wz * wz);
+    for (std::size_t lane = 0; lane < lanes; ++lane) {
+      if (!counts[lane]) continue;
+      const Vector v{px[lane], py[lane], pz[lane]};
+      if (out.count > 0 && same(v, out.point[out.count - 1])) continue;  // a copy
+      if (out.count == most_candidates) return false;
+      out.point[out.count++] = v;
+    }
   }
   return true;
 }
@@ -127,8 +131,10 @@ inline Support support_of_points(const Candidates& near, const Vector& n, const 
   Support h{};
   double sum = 0.0;
   for (std::size_t i = 0; i < near.count; ++i) {
-    const double below = (top - height[i]) / eps, weight = __builtin_exp(-below);
-    height[i] = below > most_below ? 0.0 : weight;
+    const double below = (top - height[i]) / eps;
+    height[i] = 0.0;
+    if (below > most_below) continue;
+    height[i] = __builtin_exp(-below);
     sum += height[i];
     h.point = h.point + height[i] * near.point[i];
   }
@@ -243,7 +249,7 @@ inline Rounded round_within(const Model& model, const Placed& placed, double eps
     for (int k = 0; k < rounding_halvings && !better; ++k, share *= 0.5) {
       const Vector n = s.n + (share * move[0]) * s.tangent[0] + (share * move[1]) * s.tangent[1];
       next = separation(near, placed, (1.0 / length(n)) * n, eps);
-      better = next.value > s.value || size < 1e-7;
+      better = next.value > s.value || size < 1e-6;
     }
     if (!better) break;
     s = next;
@@ -290,6 +296,19 @@ inline void round_off(const Model& model, const Placed& placed, double size, Con
     if (how == Rounded::too_many_vertices) most = turn = 0.25 * turn;
     if (how == Rounded::turns_further) turn = 4.0 * turn < most ? 4.0 * turn : most;
   }
+}
+
+// The same from a normal that is known from a similar place, without the contact of the shapes as
+// they are; false where that is not found, or where the rounded shapes overlap. The separation is
+// concave where it is positive, so that any maximum is the largest one.
+inline bool round_off_from(const Model& model, const Placed& placed, double size,
+                           const double* normal, Contact& c) {
+  Vector n{normal[0], normal[1], normal[2]};
+  const double square = dot(n, n);
+  if (!(square > 0.5 && square < 2.0)) return false;
+  n = (1.0 / __builtin_sqrt(square)) * n;
+  const double eps = rounding_of(*placed.first, rounding_of(*placed.second, size));
+  return round_within(model, placed, eps, first_turn, n, c) == Rounded::found && c.distance > 0.0;
 }
 
 // Adds force d'' of rounded shapes to a matrix (nv, nv). work: at least 6 x columns.

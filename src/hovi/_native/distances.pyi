@@ -45,6 +45,7 @@ class PairDistances:
         known: Index,
         wanted: Mask | None = None,
         rounding: Array | None = None,
+        normals: Array | None = None,
     ) -> None: ...
     def expand(
         self,
@@ -58,4 +59,5 @@ class PairDistances:
         curvature: Array,
         wanted: Mask | None = None,
         rounding: Array | None = None,
+        normals: Array | None = None,
     ) -> None: ...

@@ -363,6 +363,41 @@ def test_rounded_distances_are_hardly_smaller_and_have_derivatives(
     assert error.max() < 1e-4
 
 
+@pytest.mark.parametrize("joints", JOINTS.values(), ids=JOINTS)
+@pytest.mark.parametrize("given", ["none", "nearby", "random", "opposite", "no numbers"])
+def test_rounded_distances_are_the_same_from_any_normal(
+    joints: list[pin.JointModel], given: str
+) -> None:
+    robot = robot_of(chain(joints))
+    geometry = geometry_of(robot.model, [*SHAPES.values()])
+    compiled, pairs = CompiledDistances(robot, geometry), everything(geometry)
+    q = configurations(robot, 30)
+    sizes = np.full((len(q), len(pairs)), ROUNDING)
+    force, normals = np.ones(sizes.shape), np.zeros((*sizes.shape, 3))
+    random = np.random.default_rng(3)
+    if given in ("nearby", "opposite"):
+        near = robot.integrate(q, random.uniform(-0.05, 0.05, (len(q), robot.nv)))
+        compiled.values(near, pairs, np.inf, rounding=sizes, normals=normals)
+        known = np.linalg.norm(normals, axis=2)
+        assert (np.isclose(known, 1.0) | (known == 0.0)).all()
+        assert (known > 0.0).mean() > 0.5
+        normals *= -1.0 if given == "opposite" else 1.0
+    elif given == "random":
+        normals = random.normal(size=normals.shape)
+        normals /= np.linalg.norm(normals, axis=2, keepdims=True)
+    elif given == "no numbers":
+        normals[:] = np.nan
+    expected = compiled.expand(q, pairs, np.inf, force, rounding=sizes)
+    found = compiled.expand(q, pairs, np.inf, force, rounding=sizes, normals=normals)
+    np.testing.assert_array_equal(found[1], expected[1])
+    exact = expected[1] == EXACT
+    np.testing.assert_allclose(found[0][exact], expected[0][exact], atol=1e-9)
+    sharp = exact & (expected[0] > 0.0)
+    np.testing.assert_allclose(found[2][sharp], expected[2][sharp], atol=1e-6)
+    again = compiled.values(q, pairs, np.inf, rounding=sizes, normals=normals)
+    np.testing.assert_allclose(again[0][exact], expected[0][exact], atol=1e-9)
+
+
 def test_parallel_faces_are_never_taken_for_an_overlap() -> None:
     """The origin may seem to be inside a flat simplex, by rounding: it did in 1 of 144."""
     random = np.random.default_rng(0)

@@ -67,17 +67,18 @@ class CompiledDistances:
         reach: float,
         wanted: Mask | None = None,
         rounding: Array | None = None,
+        normals: Array | None = None,
     ) -> tuple[Array, Index]:
         """Distances of chosen pairs at configurations (P, nq), and how each is known, (P, k).
 
         reach: distance in [m], beyond which a lower bound of at least that is enough.
         wanted: which distances are, (P, k), all if None; others count as FAR at the reach.
-        rounding: see Distances.values.
+        rounding, normals: see Distances.values.
         """
         distances = np.empty((len(q), len(chosen)))
         known = np.empty(distances.shape, dtype=np.int64)
         at = self._coordinates(q)
-        self._kernel.values(at, chosen, reach, distances, known, wanted, rounding)
+        self._kernel.values(at, chosen, reach, distances, known, wanted, rounding, normals)
         return distances, known
 
     def expand(
@@ -88,10 +89,11 @@ class CompiledDistances:
         force: Array | None = None,
         wanted: Mask | None = None,
         rounding: Array | None = None,
+        normals: Array | None = None,
     ) -> tuple[Array, Index, Array, Array]:
         """As values, with d' (P, k, nv) and the sum of force d'' (P, nv, nv), where exact.
 
-        force: shape (P, k). wanted, rounding: as for values.
+        force: shape (P, k). wanted, rounding, normals: as for values.
         """
         P, k, nv = len(q), len(chosen), self._nv + 6 * self._paths
         distances, known = np.empty((P, k)), np.empty((P, k), dtype=np.int64)
@@ -107,6 +109,7 @@ class CompiledDistances:
             curvature,
             wanted,
             rounding,
+            normals,
         )
         if self._paths:
             jacobian = np.ascontiguousarray(jacobian[:, :, : self._nv])

@@ -144,6 +144,7 @@ class Distances:
         reach: float = np.inf,
         wanted: Mask | None = None,
         rounding: Array | None = None,
+        normals: Array | None = None,
     ) -> Array:
         """Signed distances with allowances at configurations (P, nq), shape (P, K), in [m].
 
@@ -154,8 +155,12 @@ class Distances:
         reach: distance beyond which a lower bound of at least that is returned, in [m].
         wanted: which distances are, shape (P, K), all if None; of others the reach is returned.
         rounding: size by which shapes are rounded at most, shape (P, K), in [m]; none if None.
+        normals: unit vectors between shapes that are rounded, (P, K, 3), contiguous, from which
+            searches begin, as at a configuration nearby, and which those that they end at replace;
+            zeros where none is known.
         """
-        distances = self._measured.values(self._placed(q), self._chosen, reach, wanted, rounding)
+        placed = self._placed(q)
+        distances = self._measured.values(placed, self._chosen, reach, wanted, rounding, normals)
         return distances + self.allowance if self.allowance.any() else distances
 
     def expand(self, q: Array, reach: float = np.inf) -> tuple[Array, Array]:
@@ -180,16 +185,18 @@ class Distances:
         reach: float = np.inf,
         wanted: Mask | None = None,
         rounding: Array | None = None,
+        normals: Array | None = None,
     ) -> tuple[Array, Array, Array]:
         """Distances, their derivatives, and the sum of force d'': see `expand`, `curvature`.
 
-        wanted, rounding: as for `values`.
+        wanted, rounding, normals: as for `values`.
 
         Second derivatives are exact for one pair of nearest points, which moves along the vertices,
         edges, faces and round surfaces that it lies on; cylinders that overlap have none.
         """
         placed = self._placed(q)
-        found = self._measured.expand(placed, self._chosen, reach, force, wanted, rounding)
+        given = self._chosen, reach, force, wanted, rounding, normals
+        found = self._measured.expand(placed, *given)
         distances, jacobian, curvature = found
         if self.allowance.any():
             distances = distances + self.allowance

@@ -52,19 +52,21 @@ class PairDistances:
         reach: float,
         wanted: Mask | None = None,
         rounding: Array | None = None,
+        normals: Array | None = None,
     ) -> Array:
         """Distances of pairs, by number, at configurations (P, nq), shape (P, k), in [m].
 
         reach: distance in [m], beyond which a lower bound of at least that is returned.
         wanted: which distances are, (P, k), all if None; of others the reach is returned.
-        rounding: see Distances.values.
+        rounding, normals: see Distances.values.
         """
         distances = np.empty((len(q), len(pairs)))
         self._coal.reset()
         for part in self._parts(len(q), len(pairs)):
             some = None if wanted is None else np.ascontiguousarray(wanted[part])
             sizes = None if rounding is None else np.ascontiguousarray(rounding[part])
-            distances[part] = self._part_values(q[part], pairs, reach, some, sizes)
+            begun = None if normals is None else normals[part]
+            distances[part] = self._part_values(q[part], pairs, reach, some, sizes, begun)
         return distances
 
     def expand(
@@ -75,11 +77,12 @@ class PairDistances:
         force: Array | None,
         wanted: Mask | None = None,
         rounding: Array | None = None,
+        normals: Array | None = None,
     ) -> tuple[Array, Array, Array]:
         """Distances, their derivatives (P, k, nv), and the sum of force d'', (P, nv, nv).
 
         Pairs beyond reach have no derivatives, and those that overlap by Coal no second ones.
-        force: shape (P, k); zero if None. wanted, rounding: as for `values`.
+        force: shape (P, k); zero if None. wanted, rounding, normals: as for `values`.
         """
         P, k = len(q), len(pairs)
         distances = np.empty((P, k))
@@ -89,7 +92,8 @@ class PairDistances:
             weights = None if force is None else np.ascontiguousarray(force[part])
             some = None if wanted is None else np.ascontiguousarray(wanted[part])
             sizes = None if rounding is None else np.ascontiguousarray(rounding[part])
-            found = self._part_expanded(q[part], pairs, reach, weights, some, sizes)
+            begun = None if normals is None else normals[part]
+            found = self._part_expanded(q[part], pairs, reach, weights, some, sizes, begun)
             distances[part], jacobian[part], curvature[part] = found
         return distances, jacobian, curvature
 
@@ -104,13 +108,14 @@ class PairDistances:
         reach: float,
         wanted: Mask | None,
         rounding: Array | None,
+        normals: Array | None,
     ) -> Array:
         raise_if_late()
         if self._compiled is None:
             unknown = np.ones((len(q), len(pairs)), dtype=bool) if wanted is None else wanted
             distances = np.full(unknown.shape, reach)
         else:
-            distances, known = self._compiled.values(q, pairs, reach, wanted, rounding)
+            distances, known = self._compiled.values(q, pairs, reach, wanted, rounding, normals)
             unknown = known == UNKNOWN
         for p in np.flatnonzero(unknown.any(axis=1)):
             raise_if_late()
@@ -126,6 +131,7 @@ class PairDistances:
         force: Array | None,
         wanted: Mask | None,
         rounding: Array | None,
+        normals: Array | None,
     ) -> tuple[Array, Array, Array]:
         raise_if_late()
         P, k, nv = len(q), len(pairs), self._nv
@@ -134,7 +140,7 @@ class PairDistances:
             distances, jacobian = np.full((P, k), reach), np.zeros((P, k, nv))
             curvature = np.zeros((P, nv, nv))
         else:
-            found = self._compiled.expand(q, pairs, reach, force, wanted, rounding)
+            found = self._compiled.expand(q, pairs, reach, force, wanted, rounding, normals)
             distances, known, jacobian, curvature = found
             unknown = known == UNKNOWN
         for p in np.flatnonzero(unknown.any(axis=1)):

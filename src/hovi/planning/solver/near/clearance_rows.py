@@ -76,7 +76,7 @@ class ClearanceRows:
         self.order: Index = np.zeros(0, dtype=np.intp)
         self._followed: LimitRows | None = None
         self._problem, self._spread = problem, RecentPaths[Array]()
-        self._measured = RecentPaths[Array]()
+        self._measured, self._normals = RecentPaths[Array](), np.zeros((0, 3))
         none = np.zeros(0, dtype=np.intp)
         self._set(problem, none, np.zeros(0), none, np.zeros(0))
 
@@ -124,7 +124,10 @@ class ClearanceRows:
         wanted = np.zeros((len(instants), self._wanted.shape[1]), dtype=bool)
         wanted[place, column] = True
         q, sizes = self._configurations(path)[instants], self._sizes[instants]
-        d = self._some.values(q, self._reach, wanted, sizes)
+        normals = np.zeros((*wanted.shape, 3))
+        normals[place, column] = self._normals[chosen]
+        d = self._some.values(q, self._reach, wanted, sizes, normals)
+        self._normals[chosen] = normals[place, column]
         beyond = np.full(self.size, np.nan)
         beyond[chosen] = (d[place, column] - self.least) / DISTANCE_SCALE
         return beyond
@@ -135,7 +138,11 @@ class ClearanceRows:
         q, sums = self._configurations(path), self._sums
         _, slope, bend = saturated(self._excess(path))
         weights[self._instant, self._column] = force * slope / DISTANCE_SCALE
-        found = self._some.expansion(q, weights, self._reach, self._wanted, self._sizes)
+        normals = np.zeros((*weights.shape, 3))
+        normals[self._instant, self._column] = self._normals
+        given = self._reach, self._wanted, self._sizes, normals
+        found = self._some.expansion(q, weights, *given)
+        self._normals[:] = normals[self._instant, self._column]
         J = found[1][self._instant, self._column] / DISTANCE_SCALE
         bent = ((force * bend)[:, None] * J)[:, :, None] * J[:, None]
         table = np.ascontiguousarray(self._batch.tables[coordinates][:, 0])
@@ -252,8 +259,10 @@ class ClearanceRows:
         self.handed = self._beside(found)
         rounding = np.append(self.rounding, np.full(added, LEAST_ROUNDING))
         before = self._measured if problem is self._problem else RecentPaths[Array]()
+        normals = np.concatenate([self._normals, np.zeros((added, 3))])
         self._set(problem, intervals, positions, pairs, rounding)
         self._measured = before.mapped(lambda known: np.append(known, np.full(added, np.nan)))
+        self._normals = normals
         rounding = rounding.copy()
         rounding[-added:] = _rounding_of(self.values(path)[-added:])
         self._round(rounding)
@@ -288,6 +297,7 @@ class ClearanceRows:
             self._spread = RecentPaths()
         self.grid: Grid = problem.grid
         self._problem, self._measured = problem, RecentPaths()
+        self._normals = np.zeros((len(pairs), 3))
         self.intervals, self.positions, self.pairs = intervals, positions, pairs
         at, self._instant = np.unique(intervals + 1j * positions, return_inverse=True)
         chosen, self._column = np.unique(pairs, return_inverse=True)
