@@ -101,12 +101,14 @@ def solve_by_continuation(
 def _order(job: Job, failed: Solution) -> list[str]:
     """The names of the continuations in the order in which they are tried.
 
-    More steps come first if the direct solve reached its iteration limit at positive curvature.
+    More steps come first if the direct solve reached its iteration limit at positive curvature, or
+    among obstacles, where a motion that is nearly within its bounds is closer than a guess.
     """
     if failed.status is Status.INFEASIBLE:
         return list(INFEASIBLE_ORDER)
     order = LIMITED_ORDER if job.limits.bounded.any() else UNLIMITED_ORDER
-    first = failed.status is Status.ITERATION_LIMIT and failed.n_neg == 0
+    closer = failed.n_neg == 0 or job.problem().distances is not None
+    first = failed.status is Status.ITERATION_LIMIT and closer
     return [STEPS, *order] if first else [*order, STEPS]
 
 
@@ -171,7 +173,10 @@ class _Continuation:
         left = self.deadline.seconds_left
         try:
             problem, most = stage.job.problem(), self.job.options.max_iterations
-            solution = solve_on_grid(problem, guess, max_iterations=most, time_limit=left)
+            barrier = stage.job.barrier
+            solution = solve_on_grid(
+                problem, guess, max_iterations=most, time_limit=left, barrier=barrier
+            )
         except HoviError:
             return None
         self.steps += solution.nit

@@ -247,7 +247,8 @@ def _from_path_or_direct(pool: Pool, first: FirstGuesses, progress: Progress) ->
     """A single start: the first path, and the direct guess if no solution is found from it.
 
     If both fail with rows of distances, both are tried again with distances at quadrature points,
-    since that takes longer than the other guess with rows.
+    since that takes longer than the other guess with rows; not if one reached its iteration limit,
+    as more steps from there are closer to a minimum.
     """
     from hovi.planning.solver.methods.interior_point import WITHOUT_MOTION, takes_rows  # 10 ms
 
@@ -256,10 +257,10 @@ def _from_path_or_direct(pool: Pool, first: FirstGuesses, progress: Progress) ->
         ways = "rows", "points"
     guesses = first.paths[0], first.direct
     tried, stopped = list[tuple[int, Solution]](), False
-    left = {0, 1}  # guesses that are still worth trying
+    closer = False  # whether a motion is worth more steps
     for way, i in itertools.product(ways, (0, 1)):
-        if i not in left:
-            continue
+        if closer and way == "points":
+            break
         if tried:
             at_points = ", distances at quadrature points" if way == "points" else ""
             progress(("from the path", "from the direct guess")[i] + at_points, 0.5)
@@ -275,8 +276,7 @@ def _from_path_or_direct(pool: Pool, first: FirstGuesses, progress: Progress) ->
         tried.append((i, solution))
         if solution.success or stopped or pool.deadline.passed:
             break
-        if solution.status not in WITHOUT_MOTION:
-            left.discard(i)
+        closer = closer or solution.status not in WITHOUT_MOTION
     minima = distinct([each for _, each in tried])
     by_path = tuple(each.trajectory for i, each in tried if i == 0)
     return Exploration(minima, len(tried), stopped, (), first, by_path)
