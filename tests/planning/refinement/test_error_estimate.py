@@ -20,7 +20,12 @@ from hovi.errors import InputError
 from hovi.planning.problem.limits import Limits
 from hovi.planning.problem.problem import MORE_MODES, TrajectoryProblem
 from hovi.planning.refinement.candidate import contributions
-from hovi.planning.refinement.error_estimate import estimate_error, finer_than
+from hovi.planning.refinement.error_estimate import (
+    displaced,
+    estimate_error,
+    finer_than,
+    prolonged,
+)
 from hovi.planning.solver.receding.last_motion import meets
 from hovi.planning.solver.solver import Solution, solve_on_grid
 from hovi.robot.loading import load_robot
@@ -179,6 +184,24 @@ def test_contributions_within_limits_have_the_unit_of_the_cost(
         return contributions(finer)
 
     assert shares(weight) == pytest.approx(shares(1.0), rel=0.05, abs=1e-8)
+
+
+@pytest.mark.parametrize("name", ["ur5", "kinova"])
+def test_a_finer_path_is_displaced_as_the_coarse_one(name: str) -> None:
+    robot = load_robot(name)
+    start = robot.space.integrate(robot.neutral(), np.full(robot.nv, 0.2))
+    goals = [robot.space.integrate(start, np.linspace(0.9, -0.5, robot.nv) * c) for c in (1, 1.3)]
+    grid = Grid.uniform(1.0, 5, galerkin(2))
+    ld = DiscreteLagrangian(Scene(robot, []).effort_lagrangian(), grid)
+    problems = [TrajectoryProblem(ld, State(start), State(goal)) for goal in goals]
+    before, after = (each.guess("cubic") for each in problems)
+    fine = problems[0].finer.grid
+    finer = prolonged(before, fine)
+    finer.inner[:, -1] += 0.1  # what it has more
+    moved, expected = displaced(finer, before, after, robot), prolonged(after, fine)
+    expected.inner[:, -1] += 0.1
+    for field in ("q", "v", "z", "inner"):
+        np.testing.assert_allclose(getattr(moved, field), getattr(expected, field), atol=1e-9)
 
 
 def test_an_exact_cubic_has_no_error(arm_scene: Scene) -> None:

@@ -155,6 +155,8 @@ def test_replanning_near_a_resolved_motion_keeps_its_estimate(arm_scene: Scene) 
     far = first.replan(goal=[0.9, 0.2])
     assert near.success
     assert near.error_estimate == first.error_estimate
+    anew = resolved(dataclasses.replace(near, error_estimate=None))
+    assert 0.5 < anew.error_estimate / near.error_estimate < 2.0
     assert far.success
     assert far.error_estimate != first.error_estimate
     true = solve_on_grid(far.problem.finer.finer, far.trajectory)  # type: ignore[union-attr]

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import dataclasses
 from typing import Any
 
 import numpy as np
 import pytest
 
+import hovi
 from hovi.discrete.grid import DiscretePath, Grid
 from hovi.discrete.state import State
 from hovi.effects import Gravity
@@ -89,6 +91,26 @@ def test_a_valley_of_positive_curvature_gets_more_steps(arm_scene: Scene) -> Non
     found = plan(arm_scene, HANG, REACH_Q, 1.0, max_iterations=5, **GRID)
     assert found.status is Status.MINIMUM
     assert "continuation in steps found this minimum in 1 stage and" in found.message
+
+
+@pytest.mark.parametrize("status", [Status.ITERATION_LIMIT, Status.DIVERGED])
+def test_among_obstacles_a_motion_at_its_iteration_limit_gets_more_steps_first(
+    status: Status,
+) -> None:
+    robot = hovi.load_robot("ur5")
+    start, ball = robot.neutral(), hovi.Sphere([5.0, 0.0, 0.0], 0.1, name="ball")
+    ends = State(start), State(start + 0.5)
+    options = PlanOptions(limits="none", obstacles=(ball,))
+    beside = Job(Scene(robot, []), Grid.uniform(1.0, 4, galerkin(2)), *ends, options)
+    ended = dataclasses.replace(solve_on_grid(beside.problem()), status=status, n_neg=-1)
+    first = list[str]()
+
+    def report(text: str, share: float) -> None:
+        first.append(text)
+        raise KeyboardInterrupt
+
+    solve_by_continuation(beside, ended, progress=report)
+    assert ("more steps" in first[0]) == (status is Status.ITERATION_LIMIT)
 
 
 def test_every_stage_is_reported_with_increasing_progress(job: Job, failed: Solution) -> None:

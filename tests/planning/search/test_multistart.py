@@ -340,7 +340,8 @@ DIVERGED, LIMIT, FOUND = Status.DIVERGED, Status.ITERATION_LIMIT, Status.MINIMUM
     [
         ([FOUND], ["path rows"]),
         ([DIVERGED, FOUND], ["path rows", "direct rows"]),
-        ([DIVERGED, LIMIT, FOUND], ["path rows", "direct rows", "path points"]),
+        ([DIVERGED, DIVERGED, FOUND], ["path rows", "direct rows", "path points"]),
+        ([DIVERGED, LIMIT], ["path rows", "direct rows"]),
         (
             [DIVERGED, DIVERGED, LIMIT, FOUND],
             ["path rows", "direct rows", "path points", "direct points"],

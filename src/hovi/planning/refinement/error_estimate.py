@@ -32,6 +32,7 @@ from hovi.planning.solver.central_path import CentralPath
 from hovi.planning.solver.methods.method import Method
 from hovi.planning.solver.receding.last_motion import meets
 from hovi.planning.solver.solver import Solution, solve_on_grid
+from hovi.robot.space.coordinates import Coordinates
 from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
@@ -156,11 +157,14 @@ def richer_within_limits(
     return dataclasses.replace(found, finish=partial(_finished, found, central.level))
 
 
-def followed_within_limits(solution: Solution, known: FinerSolution) -> FinerSolution | None:
+def followed_within_limits(
+    solution: Solution, known: FinerSolution, before: DiscretePath
+) -> FinerSolution | None:
     """The finer solution within limits, followed from that of a motion between other ends.
 
-    Without gains, and with nothing more to finish. known: that of the other motion. None where it
-    does not belong to the solution's grid, or is too far away.
+    Without gains, and with nothing more to finish. known: that of the other motion, whose path on
+    the solution's grid is `before`: the finer path begins as far from it as the solution is. None
+    where it does not belong to the solution's grid, or is too far away.
     """
     problem, path = solution.problem, solution.trajectory.path
     assert problem is not None
@@ -171,12 +175,15 @@ def followed_within_limits(solution: Solution, known: FinerSolution) -> FinerSol
     fine = known.problem.between(problem.start, problem.goal)
     from hovi.planning.solver.methods.feasibility import follow  # 10 ms
 
-    central = follow(fine, known.central, RICHER_BARRIER)
+    start = known.central.last
+    if problem.coordinates.curved_space is None:
+        start = displaced(start, before, path, problem.coordinates)
+    central = follow(fine, known.central.ending_at(start), RICHER_BARRIER)
     if central is None:
         return None
-    cost, before = fine.ld.action(central.last), problem.ld.action(path)
+    cost, coarse = fine.ld.action(central.last), problem.ld.action(path)
     gains = np.full(problem.grid.intervals, np.nan)
-    return FinerSolution(fine, central.last, cost, before, gains, lambda: None, central)
+    return FinerSolution(fine, central.last, cost, coarse, gains, lambda: None, central)
 
 
 def _finished(found: FinerSolution, barrier: float) -> Solution | None:
@@ -285,6 +292,21 @@ def prolonged(path: DiscretePath, fine: Grid) -> DiscretePath:
     inner = np.zeros((N, fine.inner_modes, n))
     inner[:, :r] = path.inner
     return DiscretePath(path.q, path.v, path.z, inner, path.higher)
+
+
+def displaced(
+    path: DiscretePath, before: DiscretePath, after: DiscretePath, on: Coordinates
+) -> DiscretePath:
+    """A path moved by the change of another one with at most as many inner modes."""
+    inner, r = path.inner.copy(), before.inner.shape[1]
+    inner[:, :r] += after.inner - before.inner
+    return DiscretePath(
+        on.integrate(path.q, on.difference(before.q, after.q)),
+        path.v + (after.v - before.v),
+        path.z + (after.z - before.z),
+        inner,
+        path.higher + (after.higher - before.higher),
+    )
 
 
 def _gains(expansion: Expansion, values: Array, ends: int) -> Array:

@@ -276,7 +276,7 @@ def _from_path_or_direct(pool: Pool, first: FirstGuesses, progress: Progress) ->
         tried.append((i, solution))
         if solution.success or stopped or pool.deadline.passed:
             break
-        closer = closer or solution.status not in WITHOUT_MOTION
+        closer = closer or (way == "rows" and solution.status not in WITHOUT_MOTION)
     minima = distinct([each for _, each in tried])
     by_path = tuple(each.trajectory for i, each in tried if i == 0)
     return Exploration(minima, len(tried), stopped, (), first, by_path)
