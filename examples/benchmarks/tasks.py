@@ -25,7 +25,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from measuring import print_machine, print_table
+from measuring import compile_modules, print_machine, print_table
 from task_world import least_clearance, read_world
 
 import hovi
@@ -267,6 +267,7 @@ def main() -> None:
         answer = peer(scene, given.peer, known) if given.peer else planned(scene, given.limit)
         print(json.dumps(answer))
         return
+    compile_modules()
     results, peers, rows = {}, {}, []
     for scene in task_suite():
         name = f"{scene.parent.name}/{scene.stem}"
