@@ -25,8 +25,8 @@ import hovi
 def compile_modules() -> None:
     """Compile hovi's modules to bytecode, as installers do, so that no measured time contains it.
 
-    An editable installation compiles them when they are first imported, and some environments keep
-    nothing of that.
+    An editable installation compiles them when they are first imported, and with
+    PYTHONDONTWRITEBYTECODE they are compiled in every process.
     """
     compileall.compile_dir(Path(hovi.__file__).parent, quiet=2)
 

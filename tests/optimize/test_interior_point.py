@@ -100,15 +100,17 @@ class Program(BoundedObjective[Array]):
 class Disc(Program):
     """From behind a disc to the other side, with a model without the disc's curvature at hand."""
 
+    may_be_concave = True
+
     def __init__(self) -> None:
         def f(x: ca.SX) -> ca.SX:
             return (x[0] - 2.0) ** 2 + x[1] ** 2
 
         super().__init__(2, f, lambda x: [x[0] ** 2 + x[1] ** 2], [1.0], [np.inf])
-        self.convex_models = 0
+        self.inexact_models = 0
 
-    def convex_model(self, x: Array) -> QuadraticModel:
-        self.convex_models += 1
+    def model_without_concavity(self, x: Array) -> QuadraticModel:
+        self.inexact_models += 1
         sigma, rho = self._last
         return super().model(x, sigma, rho, np.zeros(1))
 
@@ -348,11 +350,44 @@ def test_a_stationary_point_of_a_model_without_all_of_its_curvature_is_no_end(
 ) -> None:
     disc = Disc()
     outcome = minimize_bounded(disc, np.array(start), Options())
-    assert disc.convex_models > 2
+    assert disc.inexact_models > 2
     assert outcome.stop is Stop.STATIONARY
     assert np.allclose(outcome.x, [2.0, 0.0], atol=1e-5)  # not the saddle (-1, 0)
+    assert isinstance(outcome.model, DenseModel)
+    exact = disc.model(outcome.x, *outcome.barrier.condensed(outcome.outputs.y))
+    np.testing.assert_array_equal(outcome.model.H, exact.H)
+    on_the_way = [x for product, x in outcome.marks if product < 1e-2]
+    assert on_the_way
+    assert all(np.linalg.norm(x - [-1.0, 0.0]) > 0.1 for x in on_the_way)
+
+
+class Ending(Quadratic):
+    """Whose exact model is not convex in the last one of so many calls."""
+
+    may_be_concave = True
+    calls, last = 0, -1
+
+    def model(self, x: Array, sigma: Array, rho: Array, multipliers: Array) -> QuadraticModel:
+        self.calls += 1
+        self._found = super().model(x, sigma, rho, multipliers)
+        assert isinstance(self._found, DenseModel)
+        concave = 1e20 * np.eye(len(x)) * (self.calls == self.last)
+        return DenseModel(self._found.gradient, self._found.H - concave)
+
+    def model_without_concavity(self, x: Array) -> QuadraticModel:
+        return self._found
+
+
+def test_the_model_at_the_end_is_exact_although_it_is_not_convex() -> None:
+    one = np.eye(1)
+    convex, ending = (Ending(one, -one[0], one, -9 * one[0], 9 * one[0]) for _ in range(2))
+    minimize_bounded(convex, np.zeros(1), Options())
+    ending.last = convex.calls
+    outcome = minimize_bounded(ending, np.zeros(1), Options())
+    assert ending.calls == convex.calls
+    assert outcome.stop is Stop.STATIONARY
     assert outcome.model is not None
-    assert outcome.model.factor(0.0) is not None
+    assert outcome.model.factor(0.0) is None
 
 
 def test_limits_and_interrupts_return_the_current_point() -> None:

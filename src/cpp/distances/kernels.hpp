@@ -73,8 +73,8 @@ enum class Known : std::int64_t { exactly, far, not_at_all };
 // points: configurations, (P, nq). pairs: numbers of k pairs. force: weights of the second
 // derivatives, (P, k), or null. wanted: which distances are, (P, k), or null for all; others count
 // as far. rounding: eps of rounding.hpp, (P, k), in [m], 0 for shapes as they are, or null if all
-// are. normals: unit vectors from one rounded shape to the other, (P, k, 3), from which each search
-// begins, and at which it ends: 0 where none is known; or null.
+// are. normals: unit normals from the first to the second rounded shape, (P, k, 3), updated in
+// place: initial guesses, 0 for a cold start, are replaced by the normals found; or null.
 struct Request {
   std::size_t points;
   const double* q;

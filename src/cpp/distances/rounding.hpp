@@ -219,11 +219,11 @@ inline void solve_plane(const Plane& M, double x, double y, double* out) {
   out[1] = inverse * (M.xx * y - M.xy * x);
 }
 
-enum class Rounded { found, too_many_vertices, turns_further, failed };
+enum class Rounded { found, unfinished, too_many_vertices, turns_further, failed };
 
 // Newton's method for the largest separation near that of a contact, from a direction, which
 // becomes the one that it ends at. The contact becomes that of the rounded shapes if it is found
-// while n turns by less than `most`.
+// while n turns by less than `most`, or as far as rounding errors allow if that is unfinished.
 inline Rounded round_within(const Model& model, const Placed& placed, double eps, double most,
                             Vector& n, Contact& c) {
   Candidates near[2];
@@ -274,7 +274,7 @@ inline Rounded round_within(const Model& model, const Placed& placed, double eps
   c.tangent[1] = s.tangent[1];
   c.bend[0] = s.at_first;
   c.bend[1] = s.at_second;
-  return Rounded::found;
+  return found ? Rounded::found : Rounded::unfinished;
 }
 
 // The size by which a shape is rounded if `size` is allowed, in [m].
@@ -292,15 +292,15 @@ inline void round_off(const Model& model, const Placed& placed, double size, Con
   double turn = first_turn, most = most_turn;
   for (int change = 0; change < turn_changes; ++change) {
     const Rounded how = round_within(model, placed, eps, turn, n, c);
-    if (how == Rounded::found || how == Rounded::failed) return;
+    if (how == Rounded::found || how == Rounded::unfinished || how == Rounded::failed) return;
     if (how == Rounded::too_many_vertices) most = turn = 0.25 * turn;
     if (how == Rounded::turns_further) turn = 4.0 * turn < most ? 4.0 * turn : most;
   }
 }
 
-// The same from a normal that is known from a similar place, without the contact of the shapes as
-// they are; false where that is not found, or where the rounded shapes overlap. The separation is
-// concave where it is positive, so that any maximum is the largest one.
+// A warm start from the normal of a nearby configuration, without GJK; false where the iteration
+// does not converge, or where the rounded shapes overlap. The separation is concave where it is
+// positive, so that any maximum is the largest one.
 inline bool round_off_from(const Model& model, const Placed& placed, double size,
                            const double* normal, Contact& c) {
   Vector n{normal[0], normal[1], normal[2]};

@@ -65,6 +65,8 @@ class BoundedObjective(ABC, Generic[X]):
     """Whether refining found outputs so far from their bounds that the iteration is to end."""
     reopens: bool = False
     """Whether new outputs may be outside their bounds, which an iteration then recovers from."""
+    may_be_concave: bool = False
+    """Whether outputs may have negative curvature that a model can leave out."""
     radii: tuple[float, float] = 50.0, 1000.0
     """First radius of the trust region, as the norm of a step in the metric, in a cold start and in
     a warm one, which is near to a solution of a similar problem."""
@@ -80,10 +82,10 @@ class BoundedObjective(ABC, Generic[X]):
         multipliers: weights of the outputs' curvature, shape (R,).
         """
 
-    def convex_model(self, x: X) -> QuadraticModel | None:
+    def model_without_concavity(self, x: X) -> QuadraticModel | None:
         """The last model, at x, without negative curvature of outputs; None if it has none.
 
-        It takes the place of the last model.
+        It takes the place of the last model, and need not be convex: the objective may not be.
         """
         return None
 

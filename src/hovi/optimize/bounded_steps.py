@@ -100,17 +100,19 @@ class BoundedSteps(Generic[X]):
     def model(self) -> QuadraticModel:
         """The model at the current point, whose multipliers of the bounds steps start from.
 
-        Where it is not convex, it is without the negative curvature of outputs, and not `exact`.
+        Where it is not convex, the objective may replace it by one that is not `exact`: see
+        BoundedObjective.model_without_concavity.
         """
         outcome = self.outcome
         sigma, rho, force = outcome.barrier.condensed(outcome.outputs.y)
         self.sigma, self.rho, self.exact = sigma, rho, True
         model = self.objective.model(outcome.x, sigma, rho, force)
-        if self.exact_from_now_on or model.factor(0.0) is not None:
+        known = self.exact_from_now_on or not self.objective.may_be_concave
+        if known or model.factor(0.0) is not None:
             return model
-        convex = self.objective.convex_model(outcome.x)
-        self.exact = convex is None
-        return convex or model
+        other = self.objective.model_without_concavity(outcome.x)
+        self.exact = other is None
+        return model if other is None else other
 
     def step(self, model: QuadraticModel) -> BoundedStep:
         """A corrected step towards a smaller mu if the model is convex, else a plain one."""
@@ -205,7 +207,7 @@ class BoundedSteps(Generic[X]):
         change = None if reaction is None else reaction[0]
         return BoundedStep(trial, along, share, predicted, 0.5 * whole, barrier, before, change)
 
-    def next_radius(self, step: BoundedStep, ratio: float) -> float:
+    def radius_after(self, step: BoundedStep, ratio: float) -> float:
         """The radius after a step, which the bounds may have cut."""
         norm, last = step.trial.norm, self.radius
         length = norm * step.share

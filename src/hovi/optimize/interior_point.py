@@ -170,10 +170,14 @@ class _Iteration(BoundedSteps[X]):
             if self.objective.blocked:
                 return
             if finished and not refined:
-                if self.exact:
-                    self.outcome.stop, self.outcome.model = Stop.STATIONARY, self.model()
+                exact, self.exact_from_now_on = self.exact, True
+                model = self.model()
+                if exact:
+                    self.outcome.stop, self.outcome.model = Stop.STATIONARY, model
                     return
-                model = self._made_exact()
+                if model.factor(0.0) is None:  # a saddle, which is hardly left at the bounds
+                    self._move_inside(SADDLE_LEVEL * self.density, SADDLE_MARGIN)
+                    model = self.model()
                 continue
             if self._is_hopeless():
                 if not self._reopened():
@@ -207,7 +211,7 @@ class _Iteration(BoundedSteps[X]):
         if self.report is not None:
             self.report(outcome.iterations, outputs.value)
         length = trial.norm * step.share
-        last, radius = self.radius, self.next_radius(step, ratio)
+        last, radius = self.radius, self.radius_after(step, ratio)
         self.shift = next_shift(trial.shift, trial.norm, radius)
         self.radius = radius
         short = length < SHORT_LENGTH * max(1.0, radius)
@@ -269,27 +273,21 @@ class _Iteration(BoundedSteps[X]):
         self._move_inside(share * self.density, max(REOPENED * outside, LEAST_REOPENED))
         return True
 
-    def _made_exact(self) -> QuadraticModel:
-        """The exact model at a stationary point of another one, from now on.
-
-        If that is a saddle, slacks are moved away from their bounds: at them it is hardly left.
-        """
-        self.exact_from_now_on = True
-        model = self.model()
-        if model.factor(0.0) is None:
-            self._move_inside(SADDLE_LEVEL * self.density, SADDLE_MARGIN)
-            model = self.model()
-        return model
-
     def _move_inside(self, mu: float, margin: float) -> None:
         """Move slacks away from their bounds, with a barrier parameter to go on with."""
         outcome = self.outcome
         bounds, y = self.objective.bounds, outcome.outputs.y
         outcome.barrier = Barrier.central(bounds, y, mu, outcome.barrier.scale, margin)
+        self._drop_marks(mu)
         self.product = outcome.barrier.mean_product()
         self.penalty, self.shift, self.radius = 0.0, 0.0, max(self.radius, 1.0)
         self.stalled, self.cautious = 0, self.plain
         self.violations.clear()
+
+    def _drop_marks(self, mu: float) -> None:
+        """Drop the points with a smaller barrier parameter: they are no longer on the way."""
+        self.marks[:] = [mark for mark in self.marks if mark[0] > mu]
+        self.marked = self.marks[-1][0] if self.marks else 0.0
 
     def _finished(self, step: BoundedStep, accepted: bool) -> bool:
         """Whether the last step, of the last mu, predicts next to nothing for its whole length."""
@@ -330,9 +328,7 @@ class _Iteration(BoundedSteps[X]):
         bounds, y, scale = objective.bounds, outcome.outputs.y, outcome.barrier.scale
         outcome.barrier = Barrier.central(bounds, y, mu, scale, LEAST_RAISED_GAP)
         self.cut, self.penalty = 0, 0.0
-        # those with a smaller mu are no longer on the central path
-        self.marks[:] = [mark for mark in self.marks if mark[0] > mu]
-        self.marked = self.marks[-1][0] if self.marks else 0.0
+        self._drop_marks(mu)
 
     def _refined(self, at_end: bool) -> bool:
         """Whether outputs were replaced by others, which bound less."""

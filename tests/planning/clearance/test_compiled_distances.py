@@ -364,19 +364,21 @@ def test_rounded_distances_are_hardly_smaller_and_have_derivatives(
 
 
 @pytest.mark.parametrize("joints", JOINTS.values(), ids=JOINTS)
-@pytest.mark.parametrize("given", ["none", "nearby", "random", "opposite", "no numbers"])
+@pytest.mark.parametrize("given", ["none", "nearby", "far", "random", "opposite", "no numbers"])
+@pytest.mark.parametrize("rounding", [1e-3, ROUNDING, 2e-5, 1e-6])
 def test_rounded_distances_are_the_same_from_any_normal(
-    joints: list[pin.JointModel], given: str
+    joints: list[pin.JointModel], given: str, rounding: float
 ) -> None:
     robot = robot_of(chain(joints))
     geometry = geometry_of(robot.model, [*SHAPES.values()])
     compiled, pairs = CompiledDistances(robot, geometry), everything(geometry)
     q = configurations(robot, 30)
-    sizes = np.full((len(q), len(pairs)), ROUNDING)
+    sizes = np.full((len(q), len(pairs)), rounding)
     force, normals = np.ones(sizes.shape), np.zeros((*sizes.shape, 3))
     random = np.random.default_rng(3)
-    if given in ("nearby", "opposite"):
-        near = robot.integrate(q, random.uniform(-0.05, 0.05, (len(q), robot.nv)))
+    if given in ("nearby", "far", "opposite"):
+        move = 0.5 if given == "far" else 0.05
+        near = robot.integrate(q, move * random.uniform(-1.0, 1.0, (len(q), robot.nv)))
         compiled.values(near, pairs, np.inf, rounding=sizes, normals=normals)
         known = np.linalg.norm(normals, axis=2)
         assert (np.isclose(known, 1.0) | (known == 0.0)).all()
@@ -392,7 +394,7 @@ def test_rounded_distances_are_the_same_from_any_normal(
     np.testing.assert_array_equal(found[1], expected[1])
     exact = expected[1] == EXACT
     np.testing.assert_allclose(found[0][exact], expected[0][exact], atol=1e-9)
-    sharp = exact & (expected[0] > 0.0)
+    sharp = exact & (expected[0] > 0.0) & (rounding >= 2e-5)  # or maxima are too flat in n
     np.testing.assert_allclose(found[2][sharp], expected[2][sharp], atol=1e-6)
     again = compiled.values(q, pairs, np.inf, rounding=sizes, normals=normals)
     np.testing.assert_allclose(again[0][exact], expected[0][exact], atol=1e-9)

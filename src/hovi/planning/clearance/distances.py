@@ -155,9 +155,9 @@ class Distances:
         reach: distance beyond which a lower bound of at least that is returned, in [m].
         wanted: which distances are, shape (P, K), all if None; of others the reach is returned.
         rounding: size by which shapes are rounded at most, shape (P, K), in [m]; none if None.
-        normals: unit vectors between shapes that are rounded, (P, K, 3), contiguous, from which
-            searches begin, as at a configuration nearby, and which those that they end at replace;
-            zeros where none is known.
+        normals: unit normals from the first to the second rounded shape, (P, K, 3), C-contiguous,
+            updated in place: initial guesses, as of a nearby configuration or 0 for a cold start,
+            are replaced by the normals found. None for cold starts.
         """
         placed = self._placed(q)
         distances = self._measured.values(placed, self._chosen, reach, wanted, rounding, normals)

@@ -65,8 +65,8 @@ class PairDistances:
         for part in self._parts(len(q), len(pairs)):
             some = None if wanted is None else np.ascontiguousarray(wanted[part])
             sizes = None if rounding is None else np.ascontiguousarray(rounding[part])
-            begun = None if normals is None else normals[part]
-            distances[part] = self._part_values(q[part], pairs, reach, some, sizes, begun)
+            guesses = None if normals is None else normals[part]
+            distances[part] = self._part_values(q[part], pairs, reach, some, sizes, guesses)
         return distances
 
     def expand(
@@ -92,8 +92,8 @@ class PairDistances:
             weights = None if force is None else np.ascontiguousarray(force[part])
             some = None if wanted is None else np.ascontiguousarray(wanted[part])
             sizes = None if rounding is None else np.ascontiguousarray(rounding[part])
-            begun = None if normals is None else normals[part]
-            found = self._part_expanded(q[part], pairs, reach, weights, some, sizes, begun)
+            guesses = None if normals is None else normals[part]
+            found = self._part_expanded(q[part], pairs, reach, weights, some, sizes, guesses)
             distances[part], jacobian[part], curvature[part] = found
         return distances, jacobian, curvature
 

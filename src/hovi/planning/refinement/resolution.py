@@ -47,7 +47,7 @@ from hovi.system.interruption import interruptible
 
 RESOLVED = 0.01
 """Largest relative difference of costs for a success."""
-NEARBY, NEARBY_RATE = 0.5, 2.0
+NEARBY, NEARBY_VELOCITY = 0.5, 2.0
 """Changes of q, and of T v, in [rad] or [m], up to which a motion near one that passed is not
 compared with a finer one, or with its own curve, again: its errors are of the same size."""
 NEARBY_COST = 0.5
@@ -183,7 +183,7 @@ class Resolution(MotionCheck):
     finer: FinerSolution | None = None
 
     def __call__(self, solution: Solution) -> Solution:
-        """The solution as `resolved` returns it; of a motion NEARBY passive torques alone count."""
+        """As `resolved`; of a motion NEARBY only the torques of passive joints are checked."""
         if not (solution.success and self._is_near(solution)):
             return self._followed(solution) or resolved(solution)
         reason = _fault_on_curve(solution, near=True)
@@ -228,14 +228,11 @@ class Resolution(MotionCheck):
             return False
         dq = problem.coordinates.difference(self.path.q, path.q)
         dv = problem.grid.duration * (path.v - self.path.v)
-        return bool(np.abs(dq).max() <= NEARBY and np.abs(dv).max() <= NEARBY_RATE)
+        return bool(np.abs(dq).max() <= NEARBY and np.abs(dv).max() <= NEARBY_VELOCITY)
 
 
 def _fault_on_curve(solution: Solution, near: bool = False) -> str:
-    """Why (a) does not hold; "" if it does.
-
-    near: whether the integral along the curve is as accurate as that of a motion NEARBY.
-    """
+    """Why (a) does not hold; "" if it does. near: skip the integral along the curve."""
     problem, trajectory = solution.problem, solution.trajectory
     assert problem is not None
     if not all(is_galerkin(scheme) for scheme, _ in problem.grid.groups):

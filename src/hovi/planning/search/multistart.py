@@ -247,8 +247,8 @@ def _from_path_or_direct(pool: Pool, first: FirstGuesses, progress: Progress) ->
     """A single start: the first path, and the direct guess if no solution is found from it.
 
     If both fail with rows of distances, both are tried again with distances at quadrature points,
-    since that takes longer than the other guess with rows; not if one reached its iteration limit,
-    as more steps from there are closer to a minimum.
+    since that takes longer than the other guess with rows; not if one left a motion, as at its
+    iteration limit, from where more steps are closer to a minimum.
     """
     from hovi.planning.solver.methods.interior_point import WITHOUT_MOTION, takes_rows  # 10 ms
 

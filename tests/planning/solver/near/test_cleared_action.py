@@ -63,7 +63,7 @@ def test_the_gradient_is_that_of_the_action_and_the_forces() -> None:
     assert pulled == pytest.approx(float((action.bounds.weights * force) @ pushed), rel=1e-9)
 
 
-def test_a_convex_model_lacks_the_negative_curvature_of_distances_alone() -> None:
+def test_a_model_without_concavity_lacks_the_negative_curvature_of_distances_alone() -> None:
     problem = problem_of("ur5")
     path = wavy(problem)
     action = action_of(problem, path, 0.1)
@@ -74,7 +74,7 @@ def test_a_convex_model_lacks_the_negative_curvature_of_distances_alone() -> Non
     assert model.factor(0.0) is None
     gradient, hessian = model.gradient, model.intervals.hessian.copy()
     near = action._near
-    convex = action.convex_model(path)
+    convex = action.model_without_concavity(path)
     assert convex is not None
     assert near is not None
     np.testing.assert_array_equal(convex.gradient, gradient)
@@ -85,7 +85,7 @@ def test_a_convex_model_lacks_the_negative_curvature_of_distances_alone() -> Non
     np.testing.assert_allclose(convex.intervals.hessian, hessian, atol=1e-12 * size)
     pushed_away[-action.near.size :] = 0.0
     action.model(path, none, none, pushed_away)
-    assert action.convex_model(path) is None
+    assert action.model_without_concavity(path) is None
 
 
 def test_rows_that_are_watched_refuse_a_step_into_a_pair_before_there_are_any() -> None:

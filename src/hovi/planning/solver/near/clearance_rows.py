@@ -83,7 +83,7 @@ class ClearanceRows:
     def copied(self, fixed: bool = False) -> ClearanceRows:
         """The same rows, to be extended on their own, or not at all."""
         rows = copy.copy(self)
-        rows.fixed = fixed
+        rows.fixed, rows._normals = fixed, self._normals.copy()
         return rows
 
     def on(self, problem: TrajectoryProblem) -> ClearanceRows:
@@ -91,6 +91,7 @@ class ClearanceRows:
         rows = copy.copy(self)
         rows._followed = None
         rows._set(problem, self.intervals, self.positions, self.pairs, self.rounding)
+        rows._normals = self._normals.copy()
         return rows
 
     @property
@@ -109,7 +110,7 @@ class ClearanceRows:
 
     def _excess(self, path: DiscretePath) -> Array:
         """What distances exceed the least one by, shape (E,); those of the last paths are kept."""
-        known = self._measured.known(path)
+        known = self._measured.get(path)
         beyond = np.full(self.size, np.nan) if known is None else known
         unknown = np.isnan(beyond)
         if unknown.any():
@@ -208,6 +209,7 @@ class ClearanceRows:
         rows._followed, rows.guard, rows._spread = None, 0.5 * within, RecentPaths()
         some = self.intervals[kept], self.positions[kept], self.pairs[kept], self.rounding[kept]
         rows._set(self._problem, *some)
+        rows._normals = self._normals[kept]
         limits = len(self.order) - self.size
         slots = np.empty(len(self.order), dtype=np.intp)
         slots[self.order] = np.arange(len(self.order))
@@ -233,7 +235,7 @@ class ClearanceRows:
 
     def _spread_distances(self, path: DiscretePath) -> Array:
         """Distances of all pairs at positions spread over the motion, (N SPREAD + 1, K)."""
-        d = self._spread.known(path)
+        d = self._spread.get(path)
         if d is None:
             batch = spread(self._problem, SPREAD)
             q = self.distances.at(configurations(self._problem, path, batch), batch.t)

@@ -62,7 +62,7 @@ class ClearedAction(BoundedAction):
     def _with_rows(self) -> None:
         super()._with_rows()
         bounds, near = self.bounds, self.near
-        self.reopens = near.size > 0
+        self.reopens = self.may_be_concave = near.size > 0
         if near.size == 0:
             return
         lower, upper, weights = (
@@ -94,14 +94,14 @@ class ClearedAction(BoundedAction):
             self._near = self.near.expanded(x, force, self.action.coordinates)
         return super().model(x, sigma, rho, multipliers)
 
-    def convex_model(self, x: DiscretePath) -> QuadraticModel | None:
-        """See BoundedObjective.convex_model: with the positive part of the rows' curvature."""
+    def model_without_concavity(self, x: DiscretePath) -> QuadraticModel | None:
+        """See BoundedObjective: with the positive part of the rows' curvature."""
         near = self._near
-        convex = None if near is None else near.without_negative_curvature()
-        if near is None or convex is None:
+        other = None if near is None else near.without_negative_curvature()
+        if near is None or other is None:
             return None
-        convex.add_at_instants(convex.curvature - near.curvature, self.action.expansion.hessian)
-        self._near = convex
+        other.add_at_instants(other.curvature - near.curvature, self.action.expansion.hessian)
+        self._near = other
         return self._under_conditions(x, self.action.model_of_expansion())
 
     def _row_terms(self, sigma: Array, rho: Array) -> Callable[[Expansion], None] | None:

@@ -12,6 +12,9 @@ from hovi.system.dataclass import dataclass
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]
 
+ROUNDING = 1e-12
+"""Negative eigenvalue that counts as none, relative to the largest one of all instants."""
+
 
 @dataclass(frozen=True, eq=False)
 class RowSums:
@@ -61,9 +64,14 @@ class ExpandedRows:
     curvature: Array
 
     def without_negative_curvature(self) -> ExpandedRows | None:
-        """The same with the positive part of the curvature at every instant; None if that is it."""
+        """The same with the positive part of the curvature at every instant.
+
+        None if the curvature is positive semidefinite to rounding, or not finite.
+        """
+        if not np.isfinite(self.curvature).all():
+            return None
         values, vectors = np.linalg.eigh(self.curvature)
-        if (values >= 0.0).all():
+        if values.min(initial=0.0) >= -ROUNDING * np.abs(values).max(initial=0.0):
             return None
         scaled = vectors * np.maximum(values, 0.0)[:, None]
         return dataclasses.replace(self, curvature=scaled @ vectors.transpose(0, 2, 1))
@@ -85,7 +93,7 @@ class ExpandedRows:
         self.add_at_instants(self.sums.by_instant(squares) + self.curvature, hessian)
 
     def add_at_instants(self, at: Array, hessian: Array) -> None:
-        """Add second derivatives in the configurations at the instants, (M, nv, nv), to those."""
+        """Add second derivatives at the instants, (M, nv, nv), to the intervals' Hessians."""
         T, n = self.table, self.jacobian.shape[1]
         both = (T[:, :, None] * T[:, None]).reshape(len(T), -1)
         ends = [*self.sums.begin[1:].tolist(), len(T)]

@@ -1,4 +1,4 @@
-"""What is known of the paths that were looked at last."""
+"""Values cached for the last few paths."""
 
 from __future__ import annotations
 
@@ -10,28 +10,28 @@ from hovi.system.dataclass import dataclass
 
 T = TypeVar("T")
 
-KEPT = 3
-"""Number of paths: that of the last trial, the current one, and the best so far."""
+MOST_PATHS = 3
+"""Number of paths: the current one, a trial and the best so far are measured in turn."""
 
 
 @dataclass(frozen=True, eq=False)
 class RecentPaths(Generic[T]):
-    """Something known of each of a few paths, the last one first.
+    """A cache of values by the identity of their paths, that measured last first.
 
-    It is never changed: each method that adds or changes something returns another one.
+    Methods that add or change something return another cache, so that copies stay independent.
     """
 
     entries: tuple[tuple[DiscretePath, T], ...] = ()
 
-    def known(self, path: DiscretePath) -> T | None:
-        """What is known of a path; None if it is none of these."""
-        return next((known for each, known in self.entries if each is path), None)
+    def get(self, path: DiscretePath) -> T | None:
+        """The value of a path; None if it is not cached."""
+        return next((value for each, value in self.entries if each is path), None)
 
-    def with_entry(self, path: DiscretePath, known: T) -> RecentPaths[T]:
-        """The same with something known of a path, instead of what was known of it."""
+    def with_entry(self, path: DiscretePath, value: T) -> RecentPaths[T]:
+        """The same with a value for a path, which replaces the one before."""
         others = tuple(entry for entry in self.entries if entry[0] is not path)
-        return RecentPaths(((path, known), *others[: KEPT - 1]))
+        return RecentPaths(((path, value), *others[: MOST_PATHS - 1]))
 
     def mapped(self, change: Callable[[T], T]) -> RecentPaths[T]:
-        """The same with everything that is known changed."""
-        return RecentPaths(tuple((path, change(known)) for path, known in self.entries))
+        """The same with every value changed."""
+        return RecentPaths(tuple((path, change(value)) for path, value in self.entries))
