@@ -100,7 +100,9 @@ class Program(BoundedObjective[Array]):
 class Disc(Program):
     """From behind a disc to the other side, with a model without the disc's curvature at hand."""
 
-    may_be_concave = True
+    @property
+    def may_be_concave(self) -> bool:
+        return True
 
     def __init__(self) -> None:
         def f(x: ca.SX) -> ca.SX:
@@ -364,8 +366,11 @@ def test_a_stationary_point_of_a_model_without_all_of_its_curvature_is_no_end(
 class Ending(Quadratic):
     """Whose exact model is not convex in the last one of so many calls."""
 
-    may_be_concave = True
     calls, last = 0, -1
+
+    @property
+    def may_be_concave(self) -> bool:
+        return True
 
     def model(self, x: Array, sigma: Array, rho: Array, multipliers: Array) -> QuadraticModel:
         self.calls += 1

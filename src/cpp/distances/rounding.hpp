@@ -33,6 +33,8 @@ constexpr std::size_t most_candidates = 512;
 // Shapes of many vertices are rounded less, since more vertices are near to each other: by at most
 // the first of these over their number, but by the second at least, in [m].
 constexpr double rounding_of_all = 0.064, least_rounding = 2e-5;
+// Radius of a shape above which rounding errors of its heights hide the largest separation, in [m].
+constexpr double largest_warm = 10.0;
 
 // The value of a support function, its gradient in the shape's frame, and its Hessian in the plane
 // of two directions.
@@ -306,6 +308,7 @@ inline bool round_off_from(const Model& model, const Placed& placed, double size
   Vector n{normal[0], normal[1], normal[2]};
   const double square = dot(n, n);
   if (!(square > 0.5 && square < 2.0)) return false;
+  if (placed.first->bound > largest_warm || placed.second->bound > largest_warm) return false;
   n = (1.0 / __builtin_sqrt(square)) * n;
   const double eps = rounding_of(*placed.first, rounding_of(*placed.second, size));
   return round_within(model, placed, eps, first_turn, n, c) == Rounded::found && c.distance > 0.0;

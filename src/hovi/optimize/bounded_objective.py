@@ -65,8 +65,6 @@ class BoundedObjective(ABC, Generic[X]):
     """Whether refining found outputs so far from their bounds that the iteration is to end."""
     reopens: bool = False
     """Whether new outputs may be outside their bounds, which an iteration then recovers from."""
-    may_be_concave: bool = False
-    """Whether outputs may have negative curvature that a model can leave out."""
     radii: tuple[float, float] = 50.0, 1000.0
     """First radius of the trust region, as the norm of a step in the metric, in a cold start and in
     a warm one, which is near to a solution of a similar problem."""
@@ -81,6 +79,11 @@ class BoundedObjective(ABC, Generic[X]):
 
         multipliers: weights of the outputs' curvature, shape (R,).
         """
+
+    @property
+    def may_be_concave(self) -> bool:
+        """Whether models may leave out negative curvature of outputs."""
+        return False
 
     def model_without_concavity(self, x: X) -> QuadraticModel | None:
         """The last model, at x, without negative curvature of outputs; None if it has none.

@@ -16,7 +16,7 @@ from hovi.discrete.grid import Grid
 from hovi.planning.problem.limits import as_limits
 from hovi.planning.refinement import resolution
 from hovi.planning.refinement.error_estimate import finer_than
-from hovi.planning.refinement.resolution import NEARBY, NEARBY_VELOCITY, RESOLVED, resolved
+from hovi.planning.refinement.resolution import NEARBY, RESOLVED, resolved
 from hovi.planning.solver.solver import Solution, solve_on_grid
 from hovi.planning.solver.status import Status
 from hovi.robot.robot import Robot
@@ -152,15 +152,12 @@ def test_a_resolved_minimum_is_preferred_to_a_cheaper_unresolved_motion(arm_scen
 def test_replanning_near_a_resolved_motion_keeps_its_estimate(arm_scene: Scene) -> None:
     first = hovi.plan(arm_scene, [-np.pi / 2, 0.0], [0.3, 0.7], 1.0, intervals=16, **FAST)
     near = first.replan(goal=[0.3 + 0.2 * NEARBY, 0.7])
-    far = first.replan(goal=[0.3 + 1.2 * NEARBY, 0.2])
-    faster = first.replan(goal=hovi.State([0.3, 0.7], [1.2 * NEARBY_VELOCITY, 0.0]))
+    far = first.replan(goal=[0.9, 0.2])
     assert near.success
     assert near.error_estimate == first.error_estimate
     anew = resolved(dataclasses.replace(near, error_estimate=None))
-    assert 0.5 < anew.error_estimate / near.error_estimate < 2.0
+    assert anew.error_estimate == pytest.approx(near.error_estimate, rel=0.5)
     assert far.success
-    assert faster.success
-    assert faster.error_estimate != first.error_estimate
     assert far.error_estimate != first.error_estimate
     true = solve_on_grid(far.problem.finer.finer, far.trajectory)  # type: ignore[union-attr]
     assert far.error_estimate == pytest.approx(abs(far.cost / true.cost - 1), rel=0.1)

@@ -47,9 +47,9 @@ from hovi.system.interruption import interruptible
 
 RESOLVED = 0.01
 """Largest relative difference of costs for a success."""
-NEARBY, NEARBY_VELOCITY = 0.5, 2.0
-"""Changes of q, and of T v, in [rad] or [m], up to which a motion near one that passed is not
-compared with a finer one, or with its own curve, again: its errors are of the same size."""
+NEARBY = 0.05
+"""Change of q, and of T v, in [rad] or [m], up to which a motion near one that passed is not
+compared with a finer one again."""
 NEARBY_COST = 0.5
 """Relative change of the cost up to which that holds: near rest small motions differ much."""
 NEGLIGIBLE = 1e-12
@@ -183,10 +183,10 @@ class Resolution(MotionCheck):
     finer: FinerSolution | None = None
 
     def __call__(self, solution: Solution) -> Solution:
-        """As `resolved`; of a motion NEARBY only the torques of passive joints are checked."""
+        """The solution as `resolved` returns it, without (b) for a motion NEARBY."""
         if not (solution.success and self._is_near(solution)):
             return self._followed(solution) or resolved(solution)
-        reason = _fault_on_curve(solution, near=True)
+        reason = _fault_on_curve(solution)
         if reason:
             return _unresolved(solution, reason)
         return dataclasses.replace(with_estimate(solution, self.estimate), check=self)
@@ -228,17 +228,16 @@ class Resolution(MotionCheck):
             return False
         dq = problem.coordinates.difference(self.path.q, path.q)
         dv = problem.grid.duration * (path.v - self.path.v)
-        return bool(np.abs(dq).max() <= NEARBY and np.abs(dv).max() <= NEARBY_VELOCITY)
+        return bool(max(np.abs(dq).max(), np.abs(dv).max()) <= NEARBY)
 
 
-def _fault_on_curve(solution: Solution, near: bool = False) -> str:
-    """Why (a) does not hold; "" if it does. near: skip the integral along the curve."""
+def _fault_on_curve(solution: Solution) -> str:
+    """Why (a) does not hold; "" if it does."""
     problem, trajectory = solution.problem, solution.trajectory
     assert problem is not None
     if not all(is_galerkin(scheme) for scheme, _ in problem.grid.groups):
         return ""
-    reason = "" if near else _fault_of_integral(solution, problem)
-    return reason or _fault_of_passive(problem, trajectory)
+    return _fault_of_integral(solution, problem) or _fault_of_passive(problem, trajectory)
 
 
 def _fault_of_period(solution: Solution) -> str:

@@ -179,9 +179,10 @@ class BoundedSearch:
 
     def _objective(self, known: Multipliers | None, algebra: LinearAlgebra | None) -> BoundedAction:
         if self.near is not None:
-            return ClearedAction(
-                self.problem, self.limits, self.margins, algebra, known, self.rows, self.near
-            )
+            common = self.problem, self.limits, self.margins, algebra, known
+            cleared = ClearedAction(*common, self.rows, self.near)
+            cleared.exact = self.along is not None and self.level is None  # of other ends
+            return cleared
         return BoundedAction(
             self.problem, self.limits, self.margins, algebra, known, self.clearance, self.rows
         )

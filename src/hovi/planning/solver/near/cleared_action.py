@@ -42,6 +42,8 @@ class ClearedAction(BoundedAction):
     """
 
     radii = 50.0, 50.0  # the neighborhood of obstacles is not convex
+    exact = False
+    """Whether models keep all curvature, so that a motion stays near the one it begins at."""
 
     def __init__(
         self,
@@ -62,7 +64,7 @@ class ClearedAction(BoundedAction):
     def _with_rows(self) -> None:
         super()._with_rows()
         bounds, near = self.bounds, self.near
-        self.reopens = self.may_be_concave = near.size > 0
+        self.reopens = near.size > 0
         if near.size == 0:
             return
         lower, upper, weights = (
@@ -93,6 +95,11 @@ class ClearedAction(BoundedAction):
         if self.near.size > 0:
             self._near = self.near.expanded(x, force, self.action.coordinates)
         return super().model(x, sigma, rho, multipliers)
+
+    @property
+    def may_be_concave(self) -> bool:
+        """See BoundedObjective."""
+        return self.near.size > 0 and not self.exact
 
     def model_without_concavity(self, x: DiscretePath) -> QuadraticModel | None:
         """See BoundedObjective: with the positive part of the rows' curvature."""
