@@ -228,7 +228,8 @@ def _solved_warm(search: BoundedSearch, known: Barrier, path: DiscretePath) -> B
 
 def _solved_from_level(search: BoundedSearch, along: CentralPath, level: float) -> Bounded:
     """Solve from the point of a central path with a barrier as large as a level."""
-    problem, (share, point) = search.problem, along.at(level)
+    problem, other_ends = search.problem, search.near is not None and search.level is None
+    share, point = along.close(level, problem.coordinates) if other_ends else along.at(level)
     path = problem.moved(point)
     if along.rows is None:
         search.rows.refine(path, share)
