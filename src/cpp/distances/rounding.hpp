@@ -51,9 +51,10 @@ struct Candidates {
 };
 
 // Whether a vertex may have weight while n turns by less than `turn`: `below` the highest one in the
-// direction n by more than what counts, and away from it by w.
-inline bool may_count(double below, const Vector& w, double turn) {
-  return below <= 0.0 || below * below <= turn * turn * dot(w, w);
+// direction n by more than what counts, and away from it by the root of `square`; or several.
+template <typename Number>
+inline auto may_count(const Number& below, const Number& square, double turn) {
+  return (below <= 0.0) | (below * below <= turn * turn * square);
 }
 
 // Hulls with more points than this, up to as many as there are bits, are searched from the highest
@@ -86,7 +87,8 @@ inline bool find_connected(const Model& model, const Shape& shape, const Vector&
       const std::size_t i = model.neighbor[l];
       if (!mark(i)) continue;
       const Vector v = vertex(i);
-      if (!may_count(top - dot(v, n) - most_below * eps, v - out.point[0], turn)) continue;
+      const Vector w = v - out.point[0];
+      if (!may_count(top - dot(v, n) - most_below * eps, dot(w, w), turn)) continue;
       if (out.count == most_candidates) return false;
       list[out.count] = i;
       out.point[out.count++] = v;
@@ -106,12 +108,13 @@ inline bool find_candidates(const Model& model, const Shape& shape, const Vector
   const std::size_t first = farthest_of_all(model, shape, n);
   const Vector highest{x[first], y[first], z[first]};
   const Pack nx = broadcast(n.x), ny = broadcast(n.y), nz = broadcast(n.z);
-  const Pack least = broadcast(dot(highest, n) - most_below * eps), square = broadcast(turn * turn);
+  const Pack least = broadcast(dot(highest, n) - most_below * eps);
   for (std::size_t i = 0; i < shape.count; i += lanes) {
     const Pack px = load(x + i), py = load(y + i), pz = load(z + i);
-    const Pack below = least - (px * nx + py * ny + pz * nz);  // see may_count
+    const Pack below = least - (px * nx + py * ny + pz * nz);
     const Pack wx = px - highest.x, wy = py - highest.y, wz = pz - highest.z;
-    const auto counts = below <= 0.0 || below * below <= square * (wx * wx + wy * wy + wz * wz);
+    const Pack square = wx * wx + wy * wy + wz * wz;
+    const auto counts = may_count(below, square, turn);
     for (std::size_t lane = 0; lane < lanes; ++lane) {
       if (!counts[lane]) continue;
       const Vector v{px[lane], py[lane], pz[lane]};

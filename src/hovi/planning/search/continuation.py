@@ -107,7 +107,7 @@ def _order(job: Job, failed: Solution) -> list[str]:
     if failed.status is Status.INFEASIBLE:
         return list(INFEASIBLE_ORDER)
     order = LIMITED_ORDER if job.limits.bounded.any() else UNLIMITED_ORDER
-    closer = failed.n_neg == 0 or job.problem().distances is not None
+    closer = failed.n_neg == 0 or job.options.clearance.wanted
     first = failed.status is Status.ITERATION_LIMIT and closer
     return [STEPS, *order] if first else [*order, STEPS]
 
