@@ -13,7 +13,7 @@ from hovi.discrete.grid import Grid
 from hovi.discrete.state import State
 from hovi.planning.problem.limits import as_limits
 from hovi.planning.problem.problem import TrajectoryProblem
-from hovi.planning.refinement.limit_sensitivity import SHIFT, cost_of_tolerance
+from hovi.planning.refinement.limit_sensitivity import SHIFT, cost_of_tolerance, limit_prices
 from hovi.planning.solver.solver import Solution, solve_on_grid
 from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
@@ -44,6 +44,35 @@ def test_the_cost_of_the_tolerance_is_the_change_with_a_shift_of_all_limits(
     change = (costs[1] - costs[0]) / found.cost
     assert change > 1e-5
     assert 100 * cost_of_tolerance(found) == pytest.approx(change, rel=0.2)
+
+
+@pytest.mark.parametrize("bounds", [{"v": 3.0}, {"tau": 8.0}])
+def test_the_price_of_a_bound_is_the_change_with_a_shift_of_that_bound(
+    arm_scene: Scene, bounds: dict[str, object]
+) -> None:
+    found = limited(arm_scene, {"base": "none", **bounds})
+    problem = found.problem
+    assert problem is not None
+    assert problem.limits is not None
+    prices = limit_prices(found)
+    column = int(prices.max(axis=0).argmax())
+    side = int(prices[:, column].argmax())
+    kind, joint = divmod(column, 2)  # of q, v, a, tau
+    shift, costs = 1e-4, []
+    for share in (1.0, 2.0):
+        lower, upper = problem.limits.lower.copy(), problem.limits.upper.copy()
+        step = share * shift * (upper - lower)[kind, joint]
+        if side == 0:
+            lower[kind, joint] += step
+        else:
+            upper[kind, joint] -= step
+        limits = dataclasses.replace(problem.limits, lower=lower, upper=upper)
+        tighter = dataclasses.replace(problem, limits=limits)
+        costs.append(solve_on_grid(tighter, found.trajectory).cost)
+    change = (costs[1] - costs[0]) / shift / found.cost
+    assert change > 0.01
+    assert prices[side, column] == pytest.approx(change, rel=0.1)
+    assert prices.min() >= 0.0
 
 
 def test_limits_that_are_not_reached_add_nothing(arm_scene: Scene) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,8 @@ from hovi.discrete.grid import Grid
 from hovi.planning.problem.limits import as_limits
 from hovi.planning.refinement import resolution
 from hovi.planning.refinement.error_estimate import finer_than
-from hovi.planning.refinement.resolution import NEARBY, RESOLVED, resolved
+from hovi.planning.refinement.faults.on_curve import RESOLVED
+from hovi.planning.refinement.resolution import NEARBY, resolved
 from hovi.planning.solver.solver import Solution, solve_on_grid
 from hovi.planning.solver.status import Status
 from hovi.robot.robot import Robot
@@ -177,6 +179,7 @@ def test_within_limits_a_motion_is_compared_with_the_followed_finer_one(
     known = resolution.finer_than
     monkeypatch.setattr(resolution, "finer_than", lambda x: calls.append(1) or known(x))
     monkeypatch.setattr(resolution, "NEARBY", 1e-3)
+    monkeypatch.setattr(resolution, "NEARBY_WITHIN_LIMITS", 1e-3)
     moved = first.replan(goal=[1.204, 0.797])
     again = moved.replan(goal=[1.2, 0.8])
     assert moved.success, moved.message
@@ -185,6 +188,63 @@ def test_within_limits_a_motion_is_compared_with_the_followed_finer_one(
     anew = resolved(dataclasses.replace(moved, error_estimate=None))
     assert calls
     assert moved.error_estimate == pytest.approx(anew.error_estimate, rel=0.3, abs=3e-5)
+
+
+def fast_reach(two_link: Robot, limits: dict[str, Any], goal: list[float]) -> Solution:
+    """A reach within limits, with an error estimate."""
+    scene = Scene(two_link, [hovi.effects.Gravity()])
+    ld = DiscreteLagrangian(scene.effort_lagrangian(), Grid.uniform(1.0, 24, by_name("galerkin-2")))
+    bounds = as_limits(two_link, {"base": "none", **limits})
+    ends = hovi.State([0.0, 0.0]), hovi.State(goal)
+    found = hovi.solve(hovi.TrajectoryProblem(ld, *ends, bounds))
+    assert found.success, found.message
+    return found
+
+
+def comparisons(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """One entry for every comparison with a finer solution from now on."""
+    calls: list[int] = []
+    for name in ("finer_than", "followed_within_limits"):
+        known = getattr(resolution, name)
+        counted = partial(lambda known, *given: calls.append(1) or known(*given), known)
+        monkeypatch.setattr(resolution, name, counted)
+    return calls
+
+
+def test_an_estimate_is_kept_with_a_margin_while_the_same_limits_hold(
+    two_link: Robot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    first = fast_reach(two_link, {"v": 1.6, "tau": 60.0}, [1.2, 0.8])
+    assert first.error_estimate is not None
+    calls = comparisons(monkeypatch)
+    moved = first.replan(goal=[1.21, 0.8])
+    assert moved.success, moved.message
+    assert not calls
+    assert moved.error_estimate is not None
+    assert moved.error_estimate > 2.0 * first.error_estimate
+    anew = resolved(dataclasses.replace(moved, error_estimate=None))
+    assert anew.error_estimate is not None
+    assert anew.error_estimate <= moved.error_estimate
+
+
+@pytest.mark.parametrize(("goal", "kept"), [(1.21, True), (1.23, False)])
+def test_near_a_limit_that_begins_to_hold_no_estimate_is_too_small(
+    two_link: Robot, monkeypatch: pytest.MonkeyPatch, goal: float, kept: bool
+) -> None:
+    """Its error is some ten times that of the motion before, and more from there on."""
+    free = fast_reach(two_link, {"v": 10.0}, [1.2, 0.8])
+    fastest = float(np.abs(free.trajectory.sample(np.linspace(0.0, 1.0, 1000)).v).max())
+    first = fast_reach(two_link, {"v": 1.001 * fastest}, [1.2, 0.8])
+    calls = comparisons(monkeypatch)
+    moved = first.replan(goal=[goal, 0.8])
+    assert moved.success, moved.message
+    assert bool(calls) != kept
+    anew = resolved(dataclasses.replace(moved, error_estimate=None))
+    assert first.error_estimate is not None
+    assert anew.error_estimate is not None
+    assert moved.error_estimate is not None
+    assert anew.error_estimate > 5.0 * first.error_estimate
+    assert anew.error_estimate <= 1.2 * moved.error_estimate
 
 
 def test_no_estimate_is_kept_from_a_motion_at_rest(two_link: Robot) -> None:

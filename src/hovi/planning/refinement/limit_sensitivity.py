@@ -1,4 +1,4 @@
-"""How far the tolerance of limits moves the cost: the smallest error that can be estimated."""
+"""How far limits move the cost, by their multipliers."""
 
 from __future__ import annotations
 
@@ -19,28 +19,45 @@ SHIFT = 6.0
 def cost_of_tolerance(solution: Solution) -> float:
     """Relative change of the cost with a shift of all limits by SHIFT tolerances.
 
-    By the envelope theorem dJ = sum_j h w_j |z_j| range_j SHIFT tolerance, over the quadrature
-    points and the bounds that are active there, with their multipliers z_j, and over the control
-    points, whose forces at instants of an interval add up: an upper bound, since these are not
-    tightened. 0 without limits, or where none is active.
+    An upper bound, since control points are not tightened. 0 without limits, or where none is
+    active. It is the smallest error that can be estimated.
     """
     problem = solution.problem
     assert problem is not None
-    if not problem.limited or solution.forces is None or solution.cost == 0:
-        return 0.0
     tolerance = TOLERANCE if problem.limits is None else problem.limits.tolerance
+    return SHIFT * tolerance * float(limit_prices(solution).sum())
+
+
+def limit_prices(solution: Solution) -> Array:
+    """Relative change of the cost with every bound per range, shape (2, columns), not negative.
+
+    By the envelope theorem dJ = sum_j h w_j |z_j| range_j, over the quadrature points and the
+    bounds that are active there, with their multipliers z_j, and over the control points, whose
+    forces at instants of an interval add up. Those of lower bounds come first; columns: of
+    (q, v, ..., tau). 0 without limits, or where none is active.
+    """
+    problem = solution.problem
+    assert problem is not None
     jet_range, output_range = _ranges(problem)
-    change, at_points = 0.0, problem.ld.point_weights
+    prices = np.zeros((2, len(jet_range) + len(output_range)))
+    if not problem.limited or solution.forces is None or solution.cost == 0:
+        return prices
+    at_points = problem.ld.point_weights
     for weights, terms in zip(at_points, solution.forces, strict=False):
-        per_point = np.abs(terms.jet_gradient) @ jet_range
-        per_point += np.abs(terms.output_gradient) @ output_range
-        change += float(weights @ per_point)
+        forces = np.concatenate([terms.jet_gradient, terms.output_gradient], axis=1)
+        prices += _by_side(weights[:, None] * forces)
     if solution.instants is not None:
         weights, terms = solution.instants.weights, solution.forces[len(at_points)]
-        forces = np.zeros((problem.grid.intervals, len(jet_range)))
-        np.add.at(forces, solution.instants.intervals, weights[:, None] * terms.jet_gradient)
-        change += float((np.abs(forces) @ jet_range).sum())
-    return SHIFT * tolerance * change / abs(solution.cost)
+        by_interval = np.zeros((problem.grid.intervals, len(jet_range)))
+        np.add.at(by_interval, solution.instants.intervals, weights[:, None] * terms.jet_gradient)
+        prices[:, : len(jet_range)] += _by_side(by_interval)
+    ranges = np.concatenate([jet_range, output_range])
+    return np.asarray(prices * ranges / abs(solution.cost))
+
+
+def _by_side(forces: Array) -> Array:
+    """The sums of forces of lower bounds, which are negative, and of upper ones, (2, columns)."""
+    return np.stack([np.maximum(-forces, 0.0).sum(axis=0), np.maximum(forces, 0.0).sum(axis=0)])
 
 
 def _ranges(problem: TrajectoryProblem) -> tuple[Array, Array]:

@@ -7,12 +7,12 @@ the discrete action, but not the integral along its curve.
 from __future__ import annotations
 
 import dataclasses
-from typing import Literal
+from typing import Literal, Self
 
 import numpy as np
+import numpy.typing as npt
 
 from hovi.checks.arguments import check_arguments
-from hovi.discrete.curve_integral import integral_along
 from hovi.discrete.grid import DiscretePath
 from hovi.discrete.measures.motion_error import relative_difference
 from hovi.discrete.trajectory import Trajectory
@@ -20,6 +20,7 @@ from hovi.errors import HoviError
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.refinement.candidate import ROUNDING_FLOOR, error_of_cost
 from hovi.planning.refinement.error_estimate import (
+    LIMITED_SAFETY_FACTOR,
     FinerSolution,
     finer_than,
     followed_within_limits,
@@ -27,7 +28,15 @@ from hovi.planning.refinement.error_estimate import (
     with_estimate,
     with_metadata,
 )
-from hovi.planning.refinement.passive_torque import NEGLIGIBLE_SHARE, passive_torque
+from hovi.planning.refinement.faults.on_curve import (
+    RESOLVED,
+    costs_nothing,
+    difference_on_curve,
+    fault_of_period,
+    fault_on_curve,
+    least_cost,
+)
+from hovi.planning.refinement.limit_sensitivity import limit_prices
 from hovi.planning.refinement.whirling import (
     fault_of_distance,
     fault_of_whirling,
@@ -39,21 +48,30 @@ from hovi.planning.solver.methods.stationary import Stationary
 from hovi.planning.solver.receding.shift import Shift
 from hovi.planning.solver.solver import Check, MotionCheck, Solution, solve_on_grid
 from hovi.planning.solver.status import Status
-from hovi.schemes import is_galerkin
 from hovi.system.blas_threads import one_blas_thread
 from hovi.system.dataclass import dataclass
 from hovi.system.deadline import OutOfTimeError, is_late
 from hovi.system.interruption import interruptible
 
-RESOLVED = 0.01
-"""Largest relative difference of costs for a success."""
+Array = npt.NDArray[np.float64]
+
 NEARBY = 0.05
 """Change of q, and of T v, in [rad] or [m], up to which a motion near one that passed is not
 compared with a finer one again."""
+NEARBY_WITHIN_LIMITS, GROWTH = 0.5, 2.0
+"""The same change within limits, without obstacles and equations, while the same limits hold the
+motion, and the factor of the estimate that is kept beyond NEARBY."""
+PRICE_CHANGE, LEAST_PRICE = 0.25, 0.02
+"""Relative change of the price of a limit up to which it is the same one, and the least price, as a
+share of the cost, that this is relative to: see limit_prices."""
+ERROR_PER_PRICE = 0.01
+"""Error of the cost, per change of the price of a limit, that is added to an estimate that is kept:
+some ten times what a limit adds that begins to hold."""
+SMALL_DIFFERENCE = 1e-3
+"""Relative difference of the costs at the points and along the curve of a motion that passed up to
+which it is not looked at again near it."""
 NEARBY_COST = 0.5
 """Relative change of the cost up to which that holds: near rest small motions differ much."""
-NEGLIGIBLE = 1e-12
-"""Cost that counts as none, relative to that of torques of the size of the inertial torque."""
 
 _NO_FINER_MINIMUM = "no minimum was found near it on a finer grid"
 
@@ -137,20 +155,19 @@ def resolved(solution: Solution) -> Solution:
     assert solution.error_estimate is not None
     if solution.status is Status.STATIONARY:
         return dataclasses.replace(solution, check=resolved)
-    passed = Resolution(solution.trajectory.path, solution.cost, solution.error_estimate, finer)
-    return dataclasses.replace(solution, check=passed)
+    return dataclasses.replace(solution, check=Resolution.of(solution, finer))
 
 
 def _checked(solution: Solution) -> tuple[Solution, str, FinerSolution | None]:
     """The solution with an estimate, why it is no minimum along its way or "", and a finer one."""
-    reason, finer = _fault_of_period(solution) or _fault_on_curve(solution), None
+    reason, finer = fault_of_period(solution) or fault_on_curve(solution), None
     if solution.status is Status.STATIONARY:
         return *((solution, reason) if reason else _compared_with_stationary(solution)), None
     if not reason and solution.error_estimate is None and solution.accuracy is None:
         solution, reason, finer = _compared_with_finer(solution)
-    elif not reason and not _costs_nothing(solution):
+    elif not reason and not costs_nothing(solution):
         reason = _fault_of_estimate(solution.error_estimate)
-    error = None if _costs_nothing(solution) else solution.error_estimate
+    error = None if costs_nothing(solution) else solution.error_estimate
     for fault_of in (fault_of_whirling, fault_of_distance):
         reason = reason or fault_of(solution, error, finer)
     return solution, reason, finer
@@ -174,22 +191,34 @@ class Resolution(MotionCheck):
     """The check of motions that are replanned from a resolved one.
 
     path, cost: of the resolved motion. estimate: of the relative error of its cost, kept for
-    motions that are NEARBY. finer: the solution it was compared with, or None.
+    motions near it. finer: the solution it was compared with, or None. on_curve: the relative
+    difference of its costs at the points and along its curve. prices: of its limits; None where
+    they are not known.
     """
 
     path: DiscretePath
     cost: float
     estimate: float
     finer: FinerSolution | None = None
+    on_curve: float = np.inf
+    prices: Array | None = None
+
+    @classmethod
+    def of(cls, solution: Solution, finer: FinerSolution | None) -> Self:
+        """That of a solution with an estimate. finer: the one it was compared with."""
+        assert solution.error_estimate is not None
+        known = solution.trajectory.path, solution.cost, solution.error_estimate
+        return cls(*known, finer, difference_on_curve(solution), limit_prices(solution))
 
     def __call__(self, solution: Solution) -> Solution:
-        """The solution as `resolved` returns it, without (b) for a motion NEARBY."""
-        if not (solution.success and self._is_near(solution)):
+        """The solution as `resolved` returns it, without (b) for a motion that is near."""
+        estimate = self._kept_for(solution) if solution.success else None
+        if estimate is None:
             return self._followed(solution) or resolved(solution)
-        reason = _fault_on_curve(solution)
+        reason = "" if self.on_curve <= SMALL_DIFFERENCE else fault_on_curve(solution)
         if reason:
             return _unresolved(solution, reason)
-        return dataclasses.replace(with_estimate(solution, self.estimate), check=self)
+        return dataclasses.replace(with_estimate(solution, estimate), check=self)
 
     def _followed(self, solution: Solution) -> Solution | None:
         """As `resolved`, compared with the followed finer solution; None where that fails."""
@@ -199,13 +228,12 @@ class Resolution(MotionCheck):
             finer = followed_within_limits(solution, self.finer, self.path)
         except OutOfTimeError:
             return _not_checked(solution)
-        if finer is None or _fault_of_period(solution) or _fault_on_curve(solution):
+        if finer is None or fault_of_period(solution) or fault_on_curve(solution):
             return None
         compared, reason = _compared(solution, finer)
         if reason or compared.error_estimate is None:
             return None
-        passed = Resolution(solution.trajectory.path, solution.cost, compared.error_estimate, finer)
-        return dataclasses.replace(compared, check=passed)
+        return dataclasses.replace(compared, check=Resolution.of(compared, finer))
 
     def shifted(self, shift: Shift, problem: TrajectoryProblem) -> Check:
         """The same for the rest of the motion, where the error of the cost is as large.
@@ -216,88 +244,35 @@ class Resolution(MotionCheck):
             return resolved
         path = shift.path(self.path)
         cost = problem.ld.action(path)
-        least = max(_least_cost(problem), 1e-300)
+        least = max(least_cost(problem), 1e-300)
         estimate = self.estimate * abs(self.cost) / max(abs(cost), least)
         return resolved if estimate > RESOLVED else Resolution(path, cost, estimate)
 
-    def _is_near(self, solution: Solution) -> bool:
+    def _kept_for(self, solution: Solution) -> float | None:
+        """The estimate that is kept for a motion; None for one that is not near."""
         problem, path = solution.problem, solution.trajectory.path
         assert problem is not None
         change = abs(solution.cost - self.cost)
         if path.q.shape != self.path.q.shape or change > NEARBY_COST * abs(self.cost):
-            return False
+            return None
         dq = problem.coordinates.difference(self.path.q, path.q)
         dv = problem.grid.duration * (path.v - self.path.v)
-        return bool(max(np.abs(dq).max(), np.abs(dv).max()) <= NEARBY)
-
-
-def _fault_on_curve(solution: Solution) -> str:
-    """Why (a) does not hold; "" if it does."""
-    problem, trajectory = solution.problem, solution.trajectory
-    assert problem is not None
-    if not all(is_galerkin(scheme) for scheme, _ in problem.grid.groups):
-        return ""
-    return _fault_of_integral(solution, problem) or _fault_of_passive(problem, trajectory)
-
-
-def _fault_of_period(solution: Solution) -> str:
-    """Why a periodic motion is not one at the joints that are held; "" if it is.
-
-    Their p is the same at both ends if what is held is the phase, or along a symmetry, alone.
-    """
-    problem, p = solution.problem, solution.trajectory.momenta
-    assert problem is not None
-    if not problem.periodic:
-        return ""
-    jump = np.abs(p[-1, 0] - p[0, 0]) * ~problem.free_ends[0, 0]
-    powers = problem.grid.duration ** -np.arange(p.shape[1])
-    largest = float(np.max(np.abs(p) * powers[:, None]))
-    i = int(np.argmax(jump))
-    if jump[i] <= RESOLVED * largest:
-        return ""
-    held = problem.boundary[0][i]
-    return (
-        f"{problem.coordinates.coordinate_names[i]!r} is held at {held:.4g} by a force, since its "
-        f"momentum jumps from {p[-1, 0, i]:.4g} to {p[0, 0, i]:.4g} after a period, as at a point "
-        "that no periodic motion near the guess passes: hold another joint, or another position"
-    )
-
-
-def _fault_of_integral(solution: Solution, problem: TrajectoryProblem) -> str:
-    """The costs at the points and along the curve; "" if they agree."""
-    accuracy, estimate = solution.accuracy, solution.error_estimate
-    if accuracy is not None and estimate is not None and accuracy.along + estimate <= RESOLVED:
-        return ""  # both are that close to the cost of the same finer solution
-    action = problem.ld.action(solution.trajectory.path)
-    integral = integral_along(problem.ld.lagrangian, solution.trajectory).value
-    if abs(action - integral) <= RESOLVED * max(abs(integral), _least_cost(problem)):
-        return ""
-    return (
-        f"its cost is {action:.6g} at the quadrature points, but {integral:.6g} along its own curve"
-    )
-
-
-def _costs_nothing(solution: Solution) -> bool:
-    """Whether the cost is one of rounding errors, whose relative error says nothing."""
-    assert solution.problem is not None
-    known = solution.error_estimate is not None
-    return known and abs(solution.cost) <= RESOLVED * _least_cost(solution.problem)
-
-
-def _least_cost(problem: TrajectoryProblem) -> float:
-    """The cost to which differences are relative at least."""
-    return NEGLIGIBLE * problem.inertial_torque**2 * problem.grid.duration
-
-
-def _fault_of_passive(problem: TrajectoryProblem, trajectory: Trajectory) -> str:
-    """The torque of a passive joint between the points; "" if it is negligible."""
-    found = passive_torque(problem, trajectory)
-    if found is None or found.share <= NEGLIGIBLE_SHARE:
-        return ""
-    return (
-        f"joint {found.joint!r} is passive, but carries up to {found.torque:.3g} N m between the "
-        f"quadrature points, where other joints carry at most {found.largest:.3g}"
-    )
+        far = float(max(np.abs(dq).max(), np.abs(dv).max()))
+        most = NEARBY
+        most, more = NEARBY, 0.0
+        if self.prices is not None and problem.limited:
+            changes = np.abs(limit_prices(solution) - self.prices)
+            if (changes > PRICE_CHANGE * np.maximum(self.prices, LEAST_PRICE)).any():
+                return None
+            more = ERROR_PER_PRICE * float(changes.max())
+            if problem.distances is None and not problem.constrained:
+                most = NEARBY_WITHIN_LIMITS
+        if far <= NEARBY:
+            return self.estimate + more
+        estimate = GROWTH * self.estimate + more
+        # the estimate is LIMITED_SAFETY_FACTOR times the difference that is to be small
+        resolved_still = estimate <= LIMITED_SAFETY_FACTOR * RESOLVED
+        return estimate if far <= most and resolved_still else None
 
 
 def _compared_with_finer(solution: Solution) -> tuple[Solution, str, FinerSolution | None]:
@@ -319,7 +294,7 @@ def _compared(solution: Solution, finer: FinerSolution) -> tuple[Solution, str]:
         estimate *= finer.known / solution.cost
     compared = with_estimate(solution, estimate)
     assert solution.problem is not None
-    if difference <= RESOLVED * max(abs(solution.cost), _least_cost(solution.problem)):
+    if difference <= RESOLVED * max(abs(solution.cost), least_cost(solution.problem)):
         return compared, ""
     return compared, _cost_change(difference / abs(solution.cost))
 

@@ -1,0 +1,1 @@
+"""Why a minimum of the discrete action is none between the quadrature points."""

@@ -1,0 +1,113 @@
+"""Faults of a discrete minimum that its own curve, between the quadrature points, shows."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hovi.discrete.curve_integral import integral_along
+from hovi.discrete.trajectory import Trajectory
+from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.refinement.passive_torque import NEGLIGIBLE_SHARE, passive_torque
+from hovi.planning.solver.solver import Solution
+from hovi.schemes import is_galerkin
+
+RESOLVED = 0.01
+"""Largest relative difference of costs for a success."""
+NEGLIGIBLE = 1e-12
+"""Cost that counts as none, relative to that of torques of the size of the inertial torque."""
+
+
+def fault_on_curve(solution: Solution) -> str:
+    """What differs between the points and the curve, the cost or passive torques; "" if none does.
+
+    Of Galerkin tables, whose curve is their own.
+    """
+    problem, trajectory = solution.problem, solution.trajectory
+    assert problem is not None
+    if not _has_own_curve(problem):
+        return ""
+    return _fault_of_integral(solution, problem) or _fault_of_passive(problem, trajectory)
+
+
+def difference_on_curve(solution: Solution) -> float:
+    """The relative difference of the cost at the points and along the curve.
+
+    0 without a curve of its own, infinite with passive joints, whose torques are looked at anew.
+    """
+    problem = solution.problem
+    assert problem is not None
+    if len(problem.passive) > 0:
+        return np.inf
+    if not _has_own_curve(problem):
+        return 0.0
+    action, integral = _costs(solution, problem)
+    return abs(action - integral) / max(abs(integral), least_cost(problem), 1e-300)
+
+
+def _has_own_curve(problem: TrajectoryProblem) -> bool:
+    return all(is_galerkin(scheme) for scheme, _ in problem.grid.groups)
+
+
+def _costs(solution: Solution, problem: TrajectoryProblem) -> tuple[float, float]:
+    """The action, and the integral of L~ along the curve."""
+    integral = integral_along(problem.ld.lagrangian, solution.trajectory).value
+    return problem.ld.action(solution.trajectory.path), integral
+
+
+def fault_of_period(solution: Solution) -> str:
+    """Why a periodic motion is not one at the joints that are held; "" if it is.
+
+    Their p is the same at both ends if what is held is the phase, or along a symmetry, alone.
+    """
+    problem, p = solution.problem, solution.trajectory.momenta
+    assert problem is not None
+    if not problem.periodic:
+        return ""
+    jump = np.abs(p[-1, 0] - p[0, 0]) * ~problem.free_ends[0, 0]
+    powers = problem.grid.duration ** -np.arange(p.shape[1])
+    largest = float(np.max(np.abs(p) * powers[:, None]))
+    i = int(np.argmax(jump))
+    if jump[i] <= RESOLVED * largest:
+        return ""
+    held = problem.boundary[0][i]
+    return (
+        f"{problem.coordinates.coordinate_names[i]!r} is held at {held:.4g} by a force, since its "
+        f"momentum jumps from {p[-1, 0, i]:.4g} to {p[0, 0, i]:.4g} after a period, as at a point "
+        "that no periodic motion near the guess passes: hold another joint, or another position"
+    )
+
+
+def _fault_of_integral(solution: Solution, problem: TrajectoryProblem) -> str:
+    """The costs at the points and along the curve; "" if they agree."""
+    accuracy, estimate = solution.accuracy, solution.error_estimate
+    if accuracy is not None and estimate is not None and accuracy.along + estimate <= RESOLVED:
+        return ""  # both are that close to the cost of the same finer solution
+    action, integral = _costs(solution, problem)
+    if abs(action - integral) <= RESOLVED * max(abs(integral), least_cost(problem)):
+        return ""
+    return (
+        f"its cost is {action:.6g} at the quadrature points, but {integral:.6g} along its own curve"
+    )
+
+
+def costs_nothing(solution: Solution) -> bool:
+    """Whether the cost is one of rounding errors, whose relative error says nothing."""
+    assert solution.problem is not None
+    known = solution.error_estimate is not None
+    return known and abs(solution.cost) <= RESOLVED * least_cost(solution.problem)
+
+
+def least_cost(problem: TrajectoryProblem) -> float:
+    """The cost to which differences are relative at least."""
+    return NEGLIGIBLE * problem.inertial_torque**2 * problem.grid.duration
+
+
+def _fault_of_passive(problem: TrajectoryProblem, trajectory: Trajectory) -> str:
+    """The torque of a passive joint between the points; "" if it is negligible."""
+    found = passive_torque(problem, trajectory)
+    if found is None or found.share <= NEGLIGIBLE_SHARE:
+        return ""
+    return (
+        f"joint {found.joint!r} is passive, but carries up to {found.torque:.3g} N m between the "
+        f"quadrature points, where other joints carry at most {found.largest:.3g}"
+    )
