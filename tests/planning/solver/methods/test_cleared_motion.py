@@ -16,6 +16,8 @@ from hovi.planning.clearance.clearance import Clearance
 from hovi.planning.clearance.distances import Distances
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.methods import cleared_motion
+from hovi.planning.solver.methods.interior_point import InteriorPoint
+from hovi.planning.solver.solver import solve_on_grid
 
 INSTANTS = 2_000
 
@@ -64,6 +66,19 @@ def test_where_no_rough_motion_is_found_the_rounds_find_one(
     assert found.status in (hovi.Status.MINIMUM, hovi.Status.UNRESOLVED)
     least = least_by_coal(found.trajectory, around.scene.robot, around.options.clearance)
     assert float(around.options.clearance.margin) <= least + 1e-7
+
+
+def test_too_few_steps_are_no_proof_that_there_is_no_motion(around: hovi.Task) -> None:
+    """A motion that lacks rows still, and so comes too close, is at its iteration limit."""
+    problem = hovi.plan_task(around, intervals=16).problem
+    assert problem is not None
+    rows, least = InteriorPoint(distances="rows"), []
+    for most in (4, 6, 8):
+        found = solve_on_grid(problem, "cubic", max_iterations=most, method=rows)
+        assert found.status is hovi.Status.ITERATION_LIMIT, found.message
+        robot, clearance = around.scene.robot, around.options.clearance
+        least.append(least_by_coal(found.trajectory, robot, clearance))
+    assert min(least) < 0.0
 
 
 def test_an_obstacle_far_away_changes_nothing(around: hovi.Task) -> None:

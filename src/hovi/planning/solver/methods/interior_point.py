@@ -131,7 +131,9 @@ def _searched(search: BoundedSearch) -> MethodResult:
     reason, excess = reason or search.unmet, 0.0
     if not reason and usable(outcome) and not search.rows.fixed:
         outcome, reason, excess = tightened(search, outcome)
-        reason = reason or search.unmet or search.too_close(outcome.x)
+        reason = reason or search.unmet
+        if not reason and outcome.stop is Stop.STATIONARY:  # others may just lack rows yet
+            reason = search.too_close(outcome.x)
     problem, x, n_neg = search.problem, outcome.x, search.negative_eigenvalues(outcome)
     value, nit = problem.ld.action(x), search.iterations
     broken = "" if outcome.stop in STOPPED else _non_finite(search, x, value, excess)
