@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import field
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import casadi as ca
@@ -26,6 +26,8 @@ from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 
+KEPT = 8
+"""Number of configurations at which the equations of a frame goal are kept."""
 MAX_ANGLE_ERROR = 1e-6
 """Angle in [rad] above which a frame whose equations hold is half a turn away from its goal."""
 _TURNS = ("rotation", *ORIENTATIONS, "axis")
@@ -164,10 +166,7 @@ class FrameCondition(Condition):
 
     def evaluate(self, q: Array, v: Array) -> tuple[Array, Array]:
         """c and its Jacobian."""
-        c, J = self._linear(q)  # np.asarray of them would turn an interrupt into a SystemError
-        jacobian = np.zeros((self.size, 2, self.robot.nv))
-        jacobian[:, 0] = J.full()
-        return c.full().ravel(), jacobian
+        return self._linear_at(q.tobytes())
 
     def curvature(self, q: Array, v: Array, weights: Array) -> Array:
         """sum_i weights_i d2 c_i."""
@@ -187,6 +186,21 @@ class FrameCondition(Condition):
     def describe(self, q: Array, v: Array) -> str:
         """The distance and the angle by which the frame misses its goal."""
         return self.goal.miss_in_words(self.robot, q)
+
+    @cached_property
+    def _linear_at(self) -> Callable[[bytes], tuple[Array, Array]]:
+        """c and its Jacobian by the numbers of q: at the last ones several terms ask for them."""
+
+        def evaluated(numbers: bytes) -> tuple[Array, Array]:
+            # np.asarray of c and J would turn an interrupt into a SystemError
+            c, J = self._linear(np.frombuffer(numbers))
+            jacobian = np.zeros((self.size, 2, self.robot.nv))
+            jacobian[:, 0] = J.full()
+            value = c.full().ravel()
+            value.flags.writeable = jacobian.flags.writeable = False
+            return value, jacobian
+
+        return lru_cache(maxsize=KEPT)(evaluated)
 
     @cached_property
     def _placement(self) -> ca.Function:

@@ -14,7 +14,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from hovi.discrete.grid import DiscretePath, Grid
+from hovi.discrete.grid import DiscretePath
 from hovi.discrete.instants import InstantBatch, Instants
 from hovi.discrete.interval_batch import Coordinates
 from hovi.planning.clearance.clearance import DISTANCE_SCALE
@@ -76,6 +76,7 @@ class ClearanceRows:
         self.order: Index = np.zeros(0, dtype=np.intp)
         self._followed: LimitRows | None = None
         self._problem, self._spread = problem, RecentPaths[Array]()
+        self.grid, self._spread_batch = problem.grid, spread(problem, SPREAD)
         self._measured, self._normals = RecentPaths[Array](), np.zeros((0, 3))
         none = np.zeros(0, dtype=np.intp)
         self._set(problem, none, np.zeros(0), none, np.zeros(0))
@@ -237,7 +238,7 @@ class ClearanceRows:
         """Distances of all pairs at positions spread over the motion, (N SPREAD + 1, K)."""
         d = self._spread.get(path)
         if d is None:
-            batch = spread(self._problem, SPREAD)
+            batch = self._spread_batch
             q = self.distances.at(configurations(self._problem, path, batch), batch.t)
             d = self.distances.values(q, self.least + self.guard)
             self._spread = self._spread.with_entry(path, d)
@@ -297,7 +298,9 @@ class ClearanceRows:
         """Take rows: their intervals, positions in these, numbers of pairs, and rounding, (E,)."""
         if problem is not self._problem:
             self._spread = RecentPaths()
-        self.grid: Grid = problem.grid
+        if problem.grid is not self.grid:
+            self._spread_batch = spread(problem, SPREAD)
+        self.grid = problem.grid
         self._problem, self._measured = problem, RecentPaths()
         self._normals = np.zeros((len(pairs), 3))
         self.intervals, self.positions, self.pairs = intervals, positions, pairs
