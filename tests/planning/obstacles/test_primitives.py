@@ -18,8 +18,17 @@ NORMAL = np.array([0.2, -0.3, 1.0]) / np.linalg.norm([0.2, -0.3, 1.0])
 CORNERS = np.array([[0, 0, 0], [0.3, 0, 0], [0, 0.2, 0], [0.1, 0.1, 0.4], [0.05, 0.05, 0.1]])
 AT, RPY = [0.3, -0.2, 0.4], [0.3, -0.4, 0.5]
 ANGLES = np.linspace(0.0, 2 * np.pi, 200, endpoint=False)
-ROD = np.array([[0.1 * np.cos(a), 0.1 * np.sin(a), z] for a in ANGLES for z in (-0.3, 0.3)])
-"""The corners of a prism inside a cylinder, up to 13 micrometres from it."""
+
+
+def prism(angles: np.ndarray) -> np.ndarray:
+    """The corners of a prism inside a cylinder."""
+    return np.array([[0.1 * np.cos(a), 0.1 * np.sin(a), z] for a in angles for z in (-0.3, 0.3)])
+
+
+ROD = prism(ANGLES)
+"""A prism up to 13 micrometres from its cylinder."""
+FINE_ROD = prism(np.linspace(0.0, 2 * np.pi, 400, endpoint=False))
+"""One with more corners than a vertex may have neighbours in Coal."""
 PLACED = pin.SE3(pin.rpy.rpyToMatrix(*RPY), np.array(AT))
 
 
@@ -41,6 +50,7 @@ CASES: list[tuple[Obstacle, Placed]] = [
     ),
     (hovi.Cylinder(0.1, 0.6, AT, RPY), (hull_of(ROD), PLACED)),
     (hovi.ConvexHull(CORNERS, AT, RPY), (hull_of(CORNERS[:4]), PLACED)),
+    (hovi.ConvexHull(FINE_ROD, AT, RPY), (coal.Cylinder(0.1, 0.6), PLACED)),
 ]
 
 

@@ -12,6 +12,9 @@ LEAST_THICKNESS = 1e-3
 """Ratio of the least and the largest standard deviation of vertices that are not nearly flat."""
 LEAST_SIZE = 1e-6
 """Extent of a hull, in [m], below which Coal may crash."""
+QHULL_OPTIONS = "Qt", "QJ"
+"""Triangulated facets, and, where a vertex has more neighbours than Coal can count, as of a facet
+with hundreds of corners, vertices that are moved by some 1e-11 of the extent."""
 
 
 def hull_of(vertices: Array) -> coal.ConvexBase | None:
@@ -32,7 +35,12 @@ def hull_of(vertices: Array) -> coal.ConvexBase | None:
             return None
     points = coal.StdVec_Vec3s()
     points.extend(list(corners))
-    return coal.Convex.convexHull(points, True, "Qt")
+    for options in QHULL_OPTIONS:
+        try:
+            return coal.Convex.convexHull(points, True, options)
+        except RuntimeError:
+            continue
+    return None
 
 
 def _is_thick(vertices: Array) -> bool:
