@@ -241,7 +241,7 @@ def test_passive_joints_and_limits_leave_room_for_the_best_duration(two_link: ho
     assert "The best duration is" in found.message
 
 
-FAR_AWAY = hovi.Sphere([5.0, 5.0, 5.0], 0.1)
+FAR_AWAY = hovi.Sphere([0.0, 2.8, 0.0], 0.1)
 """An obstacle that changes nothing but the way in which a best duration is found: by solves for
 given ones."""
 

@@ -22,7 +22,8 @@ from hovi.discrete.stored_torque import StoredTorque
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError
 from hovi.planning.clearance.clearance import Clearance
-from hovi.planning.clearance.distances import Distances, distances_between
+from hovi.planning.clearance.distances import Distances
+from hovi.planning.clearance.within_reach import distances_within_reach
 from hovi.planning.problem.conserved_momentum import free_fall_contradiction, without_redundancy
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.goals import Via, goal_state
@@ -327,10 +328,9 @@ class TrajectoryProblem(ProblemSummary):
 
     @property
     def distances(self) -> Distances | None:
-        """Distances to obstacles and between links; None if nothing is to be avoided."""
-        if self.clearance is None or not self.clearance.wanted:
-            return None
-        return distances_between(self.robot, self.clearance)
+        """Distances to obstacles that can come near and between links; None without any."""
+        wanted = self.clearance is not None and self.clearance.wanted
+        return distances_within_reach(self.robot, self.clearance) if wanted else None
 
     @property
     def grid(self) -> Grid:

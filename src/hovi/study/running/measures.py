@@ -9,8 +9,9 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.discrete.trajectory import Trajectory
-from hovi.planning.clearance.clearance_violation import approach_along
+from hovi.planning.clearance.distances import distances_between
 from hovi.planning.problem.limit_violation import closeness
+from hovi.planning.solver.outcome.margins import least_distance
 from hovi.planning.solver.solver import Solution
 from hovi.planning.solver.status import Status
 from hovi.study.storage.rows import PlanRow
@@ -76,11 +77,11 @@ def _margin(solution: Solution) -> float | None:
 
 def _least_distance(solution: Solution) -> float | None:
     problem = solution.problem
-    if problem is None or problem.distances is None or not problem.distances.pairs:
+    clearance = None if problem is None else problem.clearance
+    if problem is None or clearance is None or not clearance.wanted:
         return None
-    least = 0.0 if problem.clearance is None else problem.clearance.margin
-    approach = approach_along(solution.trajectory, problem.distances, least)
-    return _finite((approach.distance - problem.distances.allowance).min())
+    distances = distances_between(problem.robot, clearance)
+    return _finite(least_distance(solution.trajectory, clearance, distances))
 
 
 def _finite(number: Any) -> float | None:

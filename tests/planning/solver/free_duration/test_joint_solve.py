@@ -232,7 +232,7 @@ def test_problems_with_equations_obstacles_and_torque_rates_are_not_supported(
     problem = arm_problem(two_link, 1.0)
     assert solves_jointly(problem)
     assert solves_jointly(limited(two_link, 1.0))
-    ball = hovi.Clearance([hovi.Sphere([3.0, 3.0, 3.0], 0.1)])
+    ball = hovi.Clearance([hovi.Sphere([0.0, 2.8, 0.0], 0.1)])
     around = TrajectoryProblem(problem.ld, problem.start, problem.goal, clearance=ball)
     passive = hovi.Scene(two_link, [Gravity(9.8)], passive=["elbow"])
     ld = DiscreteLagrangian(passive.effort_lagrangian(), problem.grid)

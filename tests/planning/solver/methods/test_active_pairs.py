@@ -28,7 +28,7 @@ from hovi.schemes import galerkin
 Array = npt.NDArray[np.float64]
 START, GOAL, T = [-1.2, 0.4], [0.9, 0.4], 1.7
 LIMITS = {"base": "none", "v": 6.0}
-FAR = hovi.Sphere([10.0, 0.0, 0.0], 0.1, name="far")
+FAR = hovi.Sphere([0.0, 2.8, 0.0], 0.1, name="far")
 
 
 def reach(scene: hovi.Scene, obstacles: list[Obstacle], limits: object = LIMITS) -> hovi.Solution:

@@ -28,7 +28,7 @@ from hovi.scene.scene import Scene
 
 Array = npt.NDArray[np.float64]
 
-FAR_BALL = hovi.Sphere([5.0, 0.0, 0.0], 0.1, name="far")
+FAR_BALL = hovi.Sphere([0.0, 0.0, 1.85], 0.1, name="far")
 LEAST = 0.05
 ROBOTS = "ur5", "kinova"
 """One on a vector space, one with continuous joints."""

@@ -9,7 +9,7 @@ import pytest
 import hovi
 
 SPEED, WAIT = 6.0, 1e-3
-BALL = hovi.Sphere([0.0, 5.0, 0.0], 0.1, name="ball")
+BALL = hovi.Sphere([0.0, 2.8, 0.0], 0.1, name="ball")
 Array = npt.NDArray[np.float64]
 
 

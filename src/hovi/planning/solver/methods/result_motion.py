@@ -24,7 +24,7 @@ def motion_of(result: MethodResult) -> Trajectory:
             metadata["segment_limits"] = [each.to_dict() for each in parts]
         else:
             metadata["limits"] = problem.limits.to_dict()
-    if problem.clearance is not None and problem.distances is not None:
+    if problem.clearance is not None and problem.clearance.wanted:
         metadata["clearance"] = problem.clearance.to_dict()
     ld = at_instants(problem, result.instants).ld
     derivatives = ld.derivatives(result.path, result.forces, result.jets)

@@ -13,7 +13,7 @@ from hovi.discrete.measures.segment_spans import segment_spans
 from hovi.discrete.trajectory import Trajectory
 from hovi.planning.clearance.clearance import Clearance
 from hovi.planning.clearance.clearance_violation import approach_along
-from hovi.planning.clearance.distances import Distances
+from hovi.planning.clearance.distances import Distances, distances_between
 from hovi.planning.problem.limit_violation import AT_LIMIT, excess_along
 from hovi.planning.problem.limits import KINDS, Limits
 from hovi.planning.problem.problem import TrajectoryProblem
@@ -113,9 +113,10 @@ def margins_of(problem: TrajectoryProblem, motion: Trajectory) -> Margins:
     Raises OutOfTimeError when the deadline in force passes before they are known.
     """
     limits, segments = limit_margins(motion, problem.limits)
-    clearance, distances = problem.clearance, problem.distances
-    if clearance is None or distances is None:
+    clearance = problem.clearance
+    if clearance is None or not clearance.wanted:
         return Margins(limits, None, segments)
+    distances = distances_between(problem.robot, clearance)
     return Margins(limits, least_distance(motion, clearance, distances), segments)
 
 

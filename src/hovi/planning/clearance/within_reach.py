@@ -1,0 +1,86 @@
+"""Obstacles that a robot on a fixed base can never come near."""
+
+from __future__ import annotations
+
+import dataclasses
+from functools import lru_cache
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi.planning.clearance.clearance import Clearance, PartOfClearance
+from hovi.planning.clearance.convex_shapes import convex_geometry
+from hovi.planning.clearance.distances import Distances, distances_between
+from hovi.planning.obstacles.obstacle import Body, Obstacle
+from hovi.robot.robot import Robot
+from hovi.robot.space.joint_kinds import kind_of
+
+Array = npt.NDArray[np.float64]
+
+BEYOND = 0.5
+"""Distance beyond the margin, in [m], from which an obstacle is never near: it has no force."""
+ROTARY = "revolute", "continuous", "spherical"
+"""Kinds of joints that turn about a point of the link before."""
+
+
+@lru_cache(maxsize=16)
+def distances_within_reach(robot: Robot, clearance: Clearance) -> Distances | None:
+    """The distances that a clearance bounds, without obstacles that are never near; None for none.
+
+    Numbers of a PartOfClearance are those of these distances.
+    """
+    if isinstance(clearance, PartOfClearance):
+        whole = distances_within_reach(robot, clearance.whole)
+        return None if whole is None else whole.restricted(clearance.numbers)
+    near = _within_reach(robot, clearance)
+    return distances_between(robot, near) if near.wanted else None
+
+
+def _within_reach(robot: Robot, clearance: Clearance) -> Clearance:
+    """The clearance, or that without the obstacles that the robot can never come near."""
+    reach = reach_of(robot) + float(clearance.margin) + BEYOND
+    if not np.isfinite(reach):
+        return clearance
+    near = [each for each in clearance.obstacles if _distance_from_origin(each) <= reach]
+    if len(near) == len(clearance.obstacles):
+        return clearance
+    far = {each.name for each in clearance.obstacles} - {each.name for each in near}
+    pairs = [pair for pair in clearance.may_touch if far.isdisjoint(pair)]
+    return dataclasses.replace(clearance, obstacles=near, may_touch=pairs)
+
+
+@lru_cache(maxsize=16)
+def reach_of(robot: Robot) -> float:
+    """Upper bound of the distance of any point of a link from the world's origin, in [m].
+
+    The sum of the lengths between joints that turn, plus the size of the shapes; infinite where
+    another joint moves a shape.
+    """
+    model = robot.model
+    reach = [0.0]
+    for j in range(1, model.njoints):
+        rotary = kind_of(model.joints[j]).label in ROTARY
+        length = float(np.linalg.norm(model.jointPlacements[j].translation))
+        reach.append(reach[model.parents[j]] + length if rotary else np.inf)
+    bounds = [0.0]
+    for shape in convex_geometry(robot).geometryObjects:
+        if shape.parentJoint != 0:
+            center, radius = _ball(Body(shape.geometry, shape.placement))
+            bounds.append(reach[shape.parentJoint] + float(np.linalg.norm(center)) + radius)
+    return max(bounds)
+
+
+def _distance_from_origin(obstacle: Obstacle) -> float:
+    """Lower bound of an obstacle's distance from the world's origin; 0 if it moves."""
+    if obstacle.motion is not None:
+        return 0.0
+    balls = map(_ball, obstacle.bodies())
+    return min(float(np.linalg.norm(center)) - radius for center, radius in balls)
+
+
+def _ball(body: Body) -> tuple[Array, float]:
+    """Center and radius of a ball that contains a body."""
+    body.shape.computeLocalAABB()
+    center = body.placement.act(np.asarray(body.shape.aabb_center))
+    radius = float(body.shape.aabb_radius)
+    return center, radius if np.isfinite(center).all() and np.isfinite(radius) else np.inf
