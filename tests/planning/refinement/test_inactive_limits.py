@@ -22,7 +22,7 @@ from hovi.scene.scene import Scene
 from hovi.schemes import galerkin
 from samples.paper_arm import HANG, REACH_Q
 
-FAR_AWAY = Sphere([9.0, 0.0, 0.0], 0.1)
+FAR_AWAY = Sphere([0.0, 2.8, 0.0], 0.1)
 
 
 def reached(scene: Scene, limits: Any, **more: Any) -> Solution:
