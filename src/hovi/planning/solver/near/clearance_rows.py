@@ -146,9 +146,12 @@ class ClearanceRows:
         found = self._some.expansion(q, weights, *given)
         self._normals[:] = normals[self._instant, self._column]
         J = found[1][self._instant, self._column] / DISTANCE_SCALE
-        bent = ((force * bend)[:, None] * J)[:, :, None] * J[:, None]
+        curvature = found[2]
+        if bend.any():
+            bent = ((force * bend)[:, None] * J)[:, :, None] * J[:, None]
+            curvature = curvature + sums.by_instant(bent)
         table = np.ascontiguousarray(self._batch.tables[coordinates][:, 0])
-        return ExpandedRows(sums, table, slope[:, None] * J, found[2] + sums.by_instant(bent))
+        return ExpandedRows(sums, table, slope[:, None] * J, curvature)
 
     def forces(self, path: DiscretePath, multipliers: Array) -> tuple[Instants, list[PointTerms]]:
         """The multipliers of the rows, (E,), as forces on q at their instants, one batch."""
