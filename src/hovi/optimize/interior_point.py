@@ -65,11 +65,10 @@ they are and to the mean density, and its largest value, relative to the mean de
 LEAST_REOPENED, LARGEST_REOPENED, MAX_REOPENINGS = 1e-5, 0.1, 6
 """Where outputs may be missed for a while: the least such parameter, the largest |y - s| at which
 slacks are moved away from their bounds instead of ending as diverged, and how many times."""
-SADDLE_LEVEL, NEXT_SADDLE_LEVEL, MOST_SADDLE_LEVEL = 1e-4, 10.0, 1e-2
-"""Barrier parameter, relative to the mean density, with which a solve goes on from a saddle that an
-inexact model led to, its ratio from one saddle to the next, and its largest value."""
-SADDLE_MARGIN = 0.1
-"""Least distance of slacks from their bounds then, relative to that parameter."""
+SADDLE_LEVEL, SADDLE_MARGIN = 1e-4, 0.1
+"""Least barrier parameter, relative to the mean density, with which a solve goes on from a saddle
+that an inexact model led to, and the least distance of slacks from their bounds then, relative to
+the range, per barrier parameter."""
 REOPENED_LEVEL = 0.3
 """The least such parameter, relative to the mean product of multipliers and gaps."""
 MARKED_AGAIN = 1.5
@@ -155,7 +154,7 @@ class _Iteration(BoundedSteps[X]):
         self.refinements = self.reopenings = 0
         self.marks = outcome.marks
         self.marked = 0.0
-        self.cut = self.saddles = 0
+        self.cut = 0
 
     def run(self) -> None:
         """Iterate until stationary, or until a limit is reached."""
@@ -178,7 +177,8 @@ class _Iteration(BoundedSteps[X]):
                     self.outcome.stop, self.outcome.model = Stop.STATIONARY, model
                     return
                 if model.factor(0.0) is None:  # a saddle, which is hardly left at the bounds
-                    self._leave_saddle()
+                    level = max(SADDLE_LEVEL, self.product / self.density)
+                    self._move_inside(level * self.density, SADDLE_MARGIN * level)
                     model = self.model()
                 continue
             if self._is_hopeless():
@@ -274,13 +274,6 @@ class _Iteration(BoundedSteps[X]):
         share = max(min(REOPENED * outside, MOST_REOPENED), LEAST_REOPENED, level)
         self._move_inside(share * self.density, max(REOPENED * outside, LEAST_REOPENED))
         return True
-
-    def _leave_saddle(self) -> None:
-        """Move slacks away from their bounds, more so at every further saddle."""
-        level = min(SADDLE_LEVEL * NEXT_SADDLE_LEVEL**self.saddles, MOST_SADDLE_LEVEL)
-        level = max(level, self.product / self.density)
-        self.saddles += 1
-        self._move_inside(level * self.density, SADDLE_MARGIN * level)
 
     def _move_inside(self, mu: float, margin: float) -> None:
         """Move slacks away from their bounds, with a barrier parameter to go on with."""

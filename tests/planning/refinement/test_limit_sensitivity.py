@@ -72,7 +72,7 @@ def test_the_price_of_a_bound_is_the_change_with_a_shift_of_that_bound(
     change = (costs[1] - costs[0]) / shift / found.cost
     assert change > 0.01
     assert prices[side, column] == pytest.approx(change, rel=0.1)
-    assert prices.min() >= 0.0
+    assert prices[1 - side, column] < 0.2 * prices[side, column]  # the motion is mostly one way
 
 
 def test_limits_that_are_not_reached_add_nothing(arm_scene: Scene) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+import hovi
 from hovi.discrete.grid import DiscretePath, Grid
 from hovi.discrete.guess import cubic, path_on_grid, with_bump
 from hovi.discrete.state import State
@@ -90,6 +91,15 @@ def test_solutions_come_in_the_order_of_the_guesses(
         assert solution.cost == alone.cost
         assert solution.status == alone.status
         assert solution.trajectory.q.tobytes() == alone.trajectory.q.tobytes()
+
+
+def test_starts_among_obstacles_may_be_solved_in_worker_processes() -> None:
+    task = hovi.load_task(hovi.example("ur5_around_sphere"))
+    here, there = (hovi.plan_task(task, starts=3, processes=number) for number in (1, 2))
+    assert here.success
+    assert there.success
+    assert here.cost == pytest.approx(there.cost, rel=1e-3)
+    assert len(here.minima) == len(there.minima)
 
 
 def test_no_guess_is_no_solution(job: Job) -> None:

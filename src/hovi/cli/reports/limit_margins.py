@@ -7,7 +7,7 @@ from dataclasses import field
 
 from hovi.discrete.trajectory import Trajectory
 from hovi.planning.clearance.clearance import Clearance
-from hovi.planning.clearance.distances import Distances, distances_between
+from hovi.planning.clearance.distances import Distances
 from hovi.planning.problem.limits import Limits
 from hovi.planning.solver.outcome import margins
 from hovi.planning.solver.outcome.margins import LimitMargins
@@ -83,7 +83,4 @@ def _distances_of(motion: Solution | Trajectory) -> tuple[Clearance, Distances] 
     """The clearance and distances of the solved problem, or those that the motion records."""
     if not isinstance(motion, Solution) or motion.problem is None:
         return kept_distances(_trajectory_of(motion))
-    clearance = motion.problem.clearance
-    if clearance is None or not clearance.wanted:
-        return None
-    return clearance, distances_between(motion.problem.robot, clearance)
+    return margins.all_distances(motion.problem)

@@ -147,7 +147,8 @@ def _is_pair(pair: Any) -> bool:
 class PartOfClearance(Clearance):
     """The clearance of some pairs of shapes only.
 
-    whole: the clearance of all pairs. numbers: of the pairs, as its distances list them.
+    whole: the clearance of all pairs. numbers: of the pairs, as `distances_within_reach` lists
+    them.
     """
 
     whole: Clearance = Clearance()

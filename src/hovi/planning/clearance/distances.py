@@ -12,7 +12,7 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from hovi.errors import InputError, ModelError, nearest
-from hovi.planning.clearance.clearance import TOUCH_DEPTH, Clearance, PartOfClearance
+from hovi.planning.clearance.clearance import TOUCH_DEPTH, Clearance
 from hovi.planning.clearance.convex_shapes import convex_geometry
 from hovi.planning.clearance.pair_distances import PairDistances
 from hovi.planning.clearance.self_collisions import self_collision_pairs
@@ -229,6 +229,4 @@ def marked_as_touching(
 @lru_cache(maxsize=16)
 def distances_between(robot: Robot, clearance: Clearance) -> Distances:
     """The distances that a clearance bounds for a robot, cached."""
-    if isinstance(clearance, PartOfClearance):
-        return distances_between(robot, clearance.whole).restricted(clearance.numbers)
     return Distances(robot, clearance)

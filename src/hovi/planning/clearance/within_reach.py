@@ -1,8 +1,7 @@
-"""Obstacles that a robot on a fixed base can never come near."""
+"""Obstacles that a robot whose joints all turn can never come near."""
 
 from __future__ import annotations
 
-import dataclasses
 from functools import lru_cache
 
 import numpy as np
@@ -17,36 +16,32 @@ from hovi.robot.space.joint_kinds import kind_of
 
 Array = npt.NDArray[np.float64]
 
-BEYOND = 0.5
-"""Distance beyond the margin, in [m], from which an obstacle is never near: it has no force."""
+NEVER_NEAR = 0.5
+"""Distance beyond the margin, in [m], at which rows are constant, and obstacles are left out."""
 ROTARY = "revolute", "continuous", "spherical"
 """Kinds of joints that turn about a point of the link before."""
 
 
 @lru_cache(maxsize=16)
-def distances_within_reach(robot: Robot, clearance: Clearance) -> Distances | None:
+def distances_within_reach(robot: Robot, clearance: Clearance | None) -> Distances | None:
     """The distances that a clearance bounds, without obstacles that are never near; None for none.
 
-    Numbers of a PartOfClearance are those of these distances.
+    Numbers of a PartOfClearance are those of these distances. Raises as Distances does.
     """
+    if clearance is None or not clearance.wanted:
+        return None
     if isinstance(clearance, PartOfClearance):
         whole = distances_within_reach(robot, clearance.whole)
         return None if whole is None else whole.restricted(clearance.numbers)
-    near = _within_reach(robot, clearance)
-    return distances_between(robot, near) if near.wanted else None
-
-
-def _within_reach(robot: Robot, clearance: Clearance) -> Clearance:
-    """The clearance, or that without the obstacles that the robot can never come near."""
-    reach = reach_of(robot) + float(clearance.margin) + BEYOND
+    every = distances_between(robot, clearance)
+    reach = reach_of(robot) + float(clearance.margin) + NEVER_NEAR
     if not np.isfinite(reach):
-        return clearance
-    near = [each for each in clearance.obstacles if _distance_from_origin(each) <= reach]
-    if len(near) == len(clearance.obstacles):
-        return clearance
-    far = {each.name for each in clearance.obstacles} - {each.name for each in near}
-    pairs = [pair for pair in clearance.may_touch if far.isdisjoint(pair)]
-    return dataclasses.replace(clearance, obstacles=near, may_touch=pairs)
+        return every
+    far = {each.name for each in clearance.obstacles if _distance_from_origin(each) > reach}
+    kept = [k for k, pair in enumerate(every.pairs) if not (pair.obstacle and pair.other in far)]
+    if len(kept) == len(every.pairs):
+        return every
+    return every.restricted(kept) if kept else None
 
 
 @lru_cache(maxsize=16)

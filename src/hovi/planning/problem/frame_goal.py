@@ -165,8 +165,8 @@ class FrameCondition(Condition):
         return self.goal.equations
 
     def evaluate(self, q: Array, v: Array) -> tuple[Array, Array]:
-        """c and its Jacobian."""
-        return self._linear_at(q.tobytes())
+        """c and its Jacobian, which are not to be changed."""
+        return self._linear_at(np.asarray(q, dtype=np.float64).tobytes())
 
     def curvature(self, q: Array, v: Array, weights: Array) -> Array:
         """sum_i weights_i d2 c_i."""

@@ -323,14 +323,13 @@ class TrajectoryProblem(ProblemSummary):
     @property
     def limited(self) -> bool:
         """Whether there are limits or obstacles."""
-        bounded = self.limits is not None and bool(self.limits.bounded.any())
-        return bounded or self.distances is not None
+        bounded = self.limits is not None and self.limits.bounded.any()
+        return bool(bounded) or self.distances is not None
 
     @property
     def distances(self) -> Distances | None:
         """Distances to obstacles that can come near and between links; None without any."""
-        wanted = self.clearance is not None and self.clearance.wanted
-        return distances_within_reach(self.robot, self.clearance) if wanted else None
+        return distances_within_reach(self.robot, self.clearance)
 
     @property
     def grid(self) -> Grid:

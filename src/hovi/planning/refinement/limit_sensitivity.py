@@ -34,7 +34,8 @@ def limit_prices(solution: Solution) -> Array:
     By the envelope theorem dJ = sum_j h w_j |z_j| range_j, over the quadrature points and the
     bounds that are active there, with their multipliers z_j, and over the control points, whose
     forces at instants of an interval add up. Those of lower bounds come first; columns: of
-    (q, v, ..., tau). 0 without limits, or where none is active.
+    (q, v, ..., tau); among obstacles those of q contain the forces of distances, too. 0 without
+    limits, or where none is active.
     """
     problem = solution.problem
     assert problem is not None

@@ -66,7 +66,7 @@ PRICE_CHANGE, LEAST_PRICE = 0.25, 0.02
 share of the cost, that this is relative to: see limit_prices."""
 ERROR_PER_PRICE = 0.01
 """Error of the cost, per change of the price of a limit, that is added to an estimate that is kept:
-some ten times what a limit adds that begins to hold."""
+a limit that begins to hold adds less."""
 SMALL_DIFFERENCE = 1e-3
 """Relative difference of the costs at the points and along the curve of a motion that passed up to
 which it is not looked at again near it."""
@@ -192,8 +192,8 @@ class Resolution(MotionCheck):
 
     path, cost: of the resolved motion. estimate: of the relative error of its cost, kept for
     motions near it. finer: the solution it was compared with, or None. on_curve: the relative
-    difference of its costs at the points and along its curve. prices: of its limits; None where
-    they are not known.
+    difference of its costs at the points and along its curve, infinite where it is to be looked at
+    anew. prices: of its limits; None without limits, and where they are not known.
     """
 
     path: DiscretePath
@@ -206,16 +206,21 @@ class Resolution(MotionCheck):
     @classmethod
     def of(cls, solution: Solution, finer: FinerSolution | None) -> Self:
         """That of a solution with an estimate. finer: the one it was compared with."""
+        assert solution.problem is not None
         assert solution.error_estimate is not None
-        known = solution.trajectory.path, solution.cost, solution.error_estimate
-        return cls(*known, finer, difference_on_curve(solution), limit_prices(solution))
+        known = solution.trajectory.path, solution.cost, solution.error_estimate, finer
+        if not solution.problem.limited or solution.forces is None:
+            return cls(*known)
+        return cls(*known, difference_on_curve(solution), limit_prices(solution))
 
     def __call__(self, solution: Solution) -> Solution:
-        """The solution as `resolved` returns it, without (b) for a motion that is near."""
+        """The solution as `resolved` returns it, with (a) alone for a motion that is near."""
         estimate = self._kept_for(solution) if solution.success else None
         if estimate is None:
             return self._followed(solution) or resolved(solution)
-        reason = "" if self.on_curve <= SMALL_DIFFERENCE else fault_on_curve(solution)
+        reason = fault_of_period(solution)
+        if self.on_curve > SMALL_DIFFERENCE:
+            reason = reason or fault_on_curve(solution)
         if reason:
             return _unresolved(solution, reason)
         return dataclasses.replace(with_estimate(solution, estimate), check=self)
@@ -246,7 +251,8 @@ class Resolution(MotionCheck):
         cost = problem.ld.action(path)
         least = max(least_cost(problem), 1e-300)
         estimate = self.estimate * abs(self.cost) / max(abs(cost), least)
-        return resolved if estimate > RESOLVED else Resolution(path, cost, estimate)
+        most = (LIMITED_SAFETY_FACTOR if problem.limited else 1.0) * RESOLVED
+        return resolved if estimate > most else Resolution(path, cost, estimate)
 
     def _kept_for(self, solution: Solution) -> float | None:
         """The estimate that is kept for a motion; None for one that is not near."""
@@ -258,21 +264,24 @@ class Resolution(MotionCheck):
         dq = problem.coordinates.difference(self.path.q, path.q)
         dv = problem.grid.duration * (path.v - self.path.v)
         far = float(max(np.abs(dq).max(), np.abs(dv).max()))
-        most = NEARBY
         most, more = NEARBY, 0.0
-        if self.prices is not None and problem.limited:
+        if self.prices is not None:
             changes = np.abs(limit_prices(solution) - self.prices)
             if (changes > PRICE_CHANGE * np.maximum(self.prices, LEAST_PRICE)).any():
                 return None
             more = ERROR_PER_PRICE * float(changes.max())
-            if problem.distances is None and not problem.constrained:
+            if _within_limits_alone(problem):
                 most = NEARBY_WITHIN_LIMITS
-        if far <= NEARBY:
-            return self.estimate + more
-        estimate = GROWTH * self.estimate + more
-        # the estimate is LIMITED_SAFETY_FACTOR times the difference that is to be small
-        resolved_still = estimate <= LIMITED_SAFETY_FACTOR * RESOLVED
-        return estimate if far <= most and resolved_still else None
+        estimate = (1.0 if far <= NEARBY else GROWTH) * self.estimate + more
+        # an estimate is LIMITED_SAFETY_FACTOR times the difference that is to be small
+        small = (far <= NEARBY and more == 0.0) or estimate <= LIMITED_SAFETY_FACTOR * RESOLVED
+        return estimate if far <= most and small else None
+
+
+def _within_limits_alone(problem: TrajectoryProblem) -> bool:
+    """Whether there are the same limits at all times, and neither obstacles nor equations."""
+    one = problem.limits is not None and not problem.limits.parts
+    return one and problem.distances is None and not problem.constrained
 
 
 def _compared_with_finer(solution: Solution) -> tuple[Solution, str, FinerSolution | None]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -45,6 +46,10 @@ class CentralPath:
     margins: Array | None = None
     near: ClearanceRows | None = None
     conditions: tuple[Array, ...] | None = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        """The state without rows of distances, which are found anew where it was sent to."""
+        return vars(self) | {"near": None}
 
     @property
     def level(self) -> float:

@@ -105,7 +105,7 @@ def saturated(y: Array) -> tuple[Array, Array, Array]:
     """
     near, far = CUTOFF
     if not np.any(y > near):  # as where rows are of near pairs alone
-        return y, np.ones_like(y), np.zeros_like(y)
+        return y.copy(), np.ones_like(y), np.zeros_like(y)
     width = far - near
     x = np.clip((y - near) / width, 0.0, 1.0)
     level = near + width * (x - x**3 + 0.5 * x**4)

@@ -9,9 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.discrete.trajectory import Trajectory
-from hovi.planning.clearance.distances import distances_between
 from hovi.planning.problem.limit_violation import closeness
-from hovi.planning.solver.outcome.margins import least_distance
+from hovi.planning.solver.outcome.margins import all_distances, least_distance
 from hovi.planning.solver.solver import Solution
 from hovi.planning.solver.status import Status
 from hovi.study.storage.rows import PlanRow
@@ -76,12 +75,8 @@ def _margin(solution: Solution) -> float | None:
 
 
 def _least_distance(solution: Solution) -> float | None:
-    problem = solution.problem
-    clearance = None if problem is None else problem.clearance
-    if problem is None or clearance is None or not clearance.wanted:
-        return None
-    distances = distances_between(problem.robot, clearance)
-    return _finite(least_distance(solution.trajectory, clearance, distances))
+    bounded = None if solution.problem is None else all_distances(solution.problem)
+    return None if bounded is None else _finite(least_distance(solution.trajectory, *bounded))
 
 
 def _finite(number: Any) -> float | None:

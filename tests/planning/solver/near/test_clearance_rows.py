@@ -219,7 +219,7 @@ def test_thinned_rows_are_those_of_near_pairs() -> None:
     path = wavy(problem)
     rows = rows_of(problem, path, 0.2)
     rows.order = np.arange(rows.size)[::-1]  # no rows of limits, the last row first
-    within = float(np.median(rows.values(path))) * DISTANCE_SCALE
+    within = 1.001 * float(np.median(rows.values(path))) * DISTANCE_SCALE
     near, kept = rows.thinned(path, within)
     ordered = rows.values(path)[rows.order]
     np.testing.assert_allclose(ordered[kept], near.values(path), atol=1e-12)

@@ -34,6 +34,14 @@ LEAST_SPACING = 1e-4
 """The same where a pair is too close by more than the extra clearance leaves."""
 USED = 0.7 * EXTRA_CLEARANCE * DISTANCE_SCALE
 """What a motion may use up of the extra clearance between rows, in [m]."""
+TOUCHING, AROUND, SHALLOW = 3e-4, 0.3, 0.01
+"""Distance beyond the least one, in [m], below which a least distance gets rows around it, which
+then hold a motion that slides along an obstacle; how far from it, relative to the interval, and the
+largest distance beyond the least one of these rows, in [m]."""
+DIP = 0.8 * USED
+"""How far a motion may dip between them, in [m]."""
+CLOSEST, WIDEST = 0.02, 0.25
+"""The least and the largest distance between them, relative to the interval."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,7 +125,33 @@ def approaches_along(
     at = np.concatenate([rows / SAMPLES, lowest[0][wanted]])
     too_close = np.append(np.zeros(len(rows), dtype=bool), lowest[2][wanted] < least)
     nearest = float(d[free_ones(problem, len(d))].min(initial=np.inf))
-    return Approaches(at, pairs[np.append(columns, lowest[1][wanted])], too_close, nearest)
+    touching = wanted & (lowest[2] < least + TOUCHING)
+    more = _around(lowest[0][touching], lowest[1][touching], d, least + SHALLOW)
+    at, too_close = np.append(at, more[0]), np.append(too_close, np.zeros(len(more[0]), dtype=bool))
+    columns = np.concatenate([columns, lowest[1][wanted], more[1]])
+    return Approaches(at, pairs[columns], too_close, nearest)
+
+
+def _around(at: Array, columns: Index, d: Array, below: float) -> tuple[Array, Index]:
+    """Positions around least distances, between which the motion dips by no more than DIP.
+
+    By the curvature of sampled distances. at, columns: where these are, and of which pairs.
+    d: sampled distances, (M, K). below: the largest distance there, in [m].
+    """
+    positions, numbers = [np.zeros(0)], [np.zeros(0, dtype=np.intp)]
+    samples, apart = np.arange(len(d)) / SAMPLES, SAMPLES // 8
+    for t, column in zip(at, columns, strict=True):
+        j = int(np.clip(np.rint(t * SAMPLES), apart, len(d) - 1 - apart))
+        before, here, after = d[j - apart, column], d[j, column], d[j + apart, column]
+        bend = max((before - 2.0 * here + after) * (SAMPLES / apart) ** 2, 1e-9)
+        step = float(np.clip(np.sqrt(8.0 * DIP / bend), CLOSEST, WIDEST))
+        steps = step * np.arange(1, int(AROUND / step) + 1)
+        beside = np.concatenate([t - steps, t + steps])
+        inside = (beside > CLOSEST) & (beside < samples[-1] - CLOSEST)
+        beside = beside[inside & (np.interp(beside, samples, d[:, column]) < below)]
+        positions.append(beside)
+        numbers.append(np.full(len(beside), column))
+    return np.concatenate(positions), np.concatenate(numbers)
 
 
 def _allowed(d: Array, least: float) -> Mask:

@@ -113,11 +113,17 @@ def margins_of(problem: TrajectoryProblem, motion: Trajectory) -> Margins:
     Raises OutOfTimeError when the deadline in force passes before they are known.
     """
     limits, segments = limit_margins(motion, problem.limits)
+    bounded = all_distances(problem)
+    least = None if bounded is None else least_distance(motion, *bounded)
+    return Margins(limits, least, segments)
+
+
+def all_distances(problem: TrajectoryProblem) -> tuple[Clearance, Distances] | None:
+    """The clearance and all distances that it bounds, far obstacles included; None without any."""
     clearance = problem.clearance
     if clearance is None or not clearance.wanted:
-        return Margins(limits, None, segments)
-    distances = distances_between(problem.robot, clearance)
-    return Margins(limits, least_distance(motion, clearance, distances), segments)
+        return None
+    return clearance, distances_between(problem.robot, clearance)
 
 
 def limit_margins(
