@@ -29,6 +29,7 @@ Array = npt.NDArray[np.float64]
 START, GOAL, T = [-1.2, 0.4], [0.9, 0.4], 1.7
 LIMITS = {"base": "none", "v": 6.0}
 FAR = hovi.Sphere([0.0, 2.8, 0.0], 0.1, name="far")
+OUT_OF_REACH = hovi.Sphere([9.0, 0.0, 0.0], 0.1, name="out of reach")
 
 
 def reach(scene: hovi.Scene, obstacles: list[Obstacle], limits: object = LIMITS) -> hovi.Solution:
@@ -125,7 +126,7 @@ def test_solves_have_the_pairs_that_the_motion_before_violates(arm_scene: hovi.S
     straight = path.trajectory(guess_path(path, "cubic"))
     middle = straight.configurations(np.array([0.5 * T]))
     aside = hovi.Sphere(robot.frame_position("tip", middle)[0], 0.1, name="aside")
-    given, result = recorded(problem_of(arm_scene, [FAR, aside]))
+    given, result = recorded(problem_of(arm_scene, [OUT_OF_REACH, FAR, aside]))
     assert given[0] == {"aside"}
     assert all("far" not in each for each in given)
     assert result.status is Status.MINIMUM, result.message

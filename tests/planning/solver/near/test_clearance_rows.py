@@ -14,7 +14,13 @@ from hovi.planning.clearance.clearance import DISTANCE_SCALE, Clearance
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.search.job import Job
 from hovi.planning.solver.action_objective import ActionObjective
-from hovi.planning.solver.near.approaches import USED, Approaches, approaches_along
+from hovi.planning.solver.near.approaches import (
+    AROUND,
+    TOUCHING,
+    USED,
+    Approaches,
+    approaches_along,
+)
 from hovi.planning.solver.near.clearance_rows import (
     BESIDE,
     LEAST_ROUNDING,
@@ -238,3 +244,26 @@ def test_what_a_motion_may_use_up_between_rows_gets_none(share: float, wanted: b
     found = approaches_along(problem, path, distances, nearest + share * USED, 0.0)
     assert (len(found.pairs) > 0) == wanted
     assert found.too_close.any() == (share > 1.0)
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_between_the_rows_around_a_touch_a_motion_cannot_dip_far(name: str) -> None:
+    """A curve through two of them with the curvature of the distance, by differences of its own."""
+    problem = problem_of(name)
+    path, distances = wavy(problem), problem.distances
+    assert distances is not None
+    motion, steps = problem.trajectory(path), problem.grid.steps
+    t = np.linspace(0.0, problem.grid.duration, 20_001)
+    d = distances.values(motion.configurations(t))
+    i, pair = np.unravel_index(int(d.argmin()), d.shape)
+    touch = t[i] / steps[0]  # equal intervals
+    bend = (d[i - 400, pair] - 2.0 * d[i, pair] + d[i + 400, pair]) / (t[400] / steps[0]) ** 2
+    found = approaches_along(problem, path, distances, float(d[i, pair]) - 1e-5, 0.0)
+    own = np.sort(found.at[found.pairs == pair])
+    around = own[np.abs(own - touch) <= AROUND]
+    assert len(around) >= 5
+    assert around[0] < touch - 0.5 * AROUND
+    assert around[-1] > touch + 0.5 * AROUND
+    assert (bend * np.diff(around) ** 2 / 8.0 < USED).all()
+    apart = approaches_along(problem, path, distances, float(d[i, pair]) - 2.0 * TOUCHING, 0.0)
+    assert (apart.pairs == pair).sum() == 1  # the least distance alone
