@@ -23,12 +23,12 @@ ROTARY = "revolute", "continuous", "spherical"
 
 
 @lru_cache(maxsize=16)
-def distances_within_reach(robot: Robot, clearance: Clearance | None) -> Distances | None:
+def distances_within_reach(robot: Robot, clearance: Clearance) -> Distances | None:
     """The distances that a clearance bounds, without obstacles that are never near; None for none.
 
     Numbers of a PartOfClearance are those of these distances. Raises as Distances does.
     """
-    if clearance is None or not clearance.wanted:
+    if not clearance.wanted:
         return None
     if isinstance(clearance, PartOfClearance):
         whole = distances_within_reach(robot, clearance.whole)

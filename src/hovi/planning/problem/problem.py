@@ -329,7 +329,8 @@ class TrajectoryProblem(ProblemSummary):
     @property
     def distances(self) -> Distances | None:
         """Distances to obstacles that can come near and between links; None without any."""
-        return distances_within_reach(self.robot, self.clearance)
+        known = self.clearance
+        return None if known is None else distances_within_reach(self.robot, known)
 
     @property
     def grid(self) -> Grid:
