@@ -11,7 +11,7 @@ import hovi
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import Grid
 from hovi.discrete.state import State
-from hovi.planning.problem.limits import as_limits
+from hovi.planning.problem.limits import Limits, as_limits
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.refinement.limit_sensitivity import SHIFT, cost_of_tolerance, limit_prices
 from hovi.planning.solver.solver import Solution, solve_on_grid
@@ -26,20 +26,27 @@ def limited(scene: Scene, limits: dict[str, object]) -> Solution:
     return hovi.plan(scene, HANG, GOAL, 1.0, limits=limits, intervals=24)
 
 
+def limited_by(
+    scene: Scene, bounds: dict[str, object]
+) -> tuple[Solution, TrajectoryProblem, Limits]:
+    """The motion within some bounds alone, its problem, and the limits of that."""
+    found = limited(scene, {"base": "none", **bounds})
+    assert found.problem is not None
+    assert found.problem.limits is not None
+    return found, found.problem, found.problem.limits
+
+
 @pytest.mark.parametrize(
     "bounds", [{"v": 3.0}, {"tau": 8.0}, {"q": [[-1.6, 0.31], [-0.4, 0.71]]}, {"a": 20.0}]
 )
 def test_the_cost_of_the_tolerance_is_the_change_with_a_shift_of_all_limits(
     arm_scene: Scene, bounds: dict[str, object]
 ) -> None:
-    found = limited(arm_scene, {"base": "none", **bounds})
-    problem = found.problem
-    assert problem is not None
-    assert problem.limits is not None
-    shift = 100 * SHIFT * problem.limits.tolerance
+    found, problem, limits = limited_by(arm_scene, bounds)
+    shift = 100 * SHIFT * limits.tolerance
     costs = []
     for margin in (shift, 2 * shift):
-        tighter = dataclasses.replace(problem, limits=problem.limits.with_margin(margin))
+        tighter = dataclasses.replace(problem, limits=limits.with_margin(margin))
         costs.append(solve_on_grid(tighter, found.trajectory).cost)
     change = (costs[1] - costs[0]) / found.cost
     assert change > 1e-5
@@ -50,24 +57,21 @@ def test_the_cost_of_the_tolerance_is_the_change_with_a_shift_of_all_limits(
 def test_the_price_of_a_bound_is_the_change_with_a_shift_of_that_bound(
     arm_scene: Scene, bounds: dict[str, object]
 ) -> None:
-    found = limited(arm_scene, {"base": "none", **bounds})
-    problem = found.problem
-    assert problem is not None
-    assert problem.limits is not None
+    found, problem, limits = limited_by(arm_scene, bounds)
     prices = limit_prices(found)
     column = int(prices.max(axis=0).argmax())
     side = int(prices[:, column].argmax())
     kind, joint = divmod(column, 2)  # of q, v, a, tau
     shift, costs = 1e-4, []
     for share in (1.0, 2.0):
-        lower, upper = problem.limits.lower.copy(), problem.limits.upper.copy()
+        lower, upper = limits.lower.copy(), limits.upper.copy()
         step = share * shift * (upper - lower)[kind, joint]
         if side == 0:
             lower[kind, joint] += step
         else:
             upper[kind, joint] -= step
-        limits = dataclasses.replace(problem.limits, lower=lower, upper=upper)
-        tighter = dataclasses.replace(problem, limits=limits)
+        shifted = dataclasses.replace(limits, lower=lower, upper=upper)
+        tighter = dataclasses.replace(problem, limits=shifted)
         costs.append(solve_on_grid(tighter, found.trajectory).cost)
     change = (costs[1] - costs[0]) / shift / found.cost
     assert change > 0.01
