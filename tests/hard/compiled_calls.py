@@ -704,6 +704,15 @@ ENTRIES: dict[str, Entry] = {
         values=_columns,
         fits=_interval_numbers_fit,
     ),
+    "intervals.changes_at": Entry(
+        intervals.changes_at,
+        {
+            **{"rows": _in("E c"), "steps": _in("N"), "intervals": _in("E", "int64")},
+            **{**_PATH, "out": _out("E n")},
+        },
+        letters={"N": (1, 4), "c": (3, 3)},
+        fits=_interval_numbers_fit,
+    ),
     "intervals.misfit": Entry(
         intervals.misfit,
         {"steps": _in("N"), "q": _in("N+1 n"), **_PATH},

@@ -174,6 +174,22 @@ void add_squares(const Index& intervals, const Index& joints, const Input<2>& ro
   kernels().add_squares(of, weights.data(), work.get(), sums.data());
 }
 
+void require_columns(const char* name, std::size_t columns, const IntervalPath& path) {
+  if (columns < 3 || columns > 3 + path.modes)
+    refuse(std::string(name) + " must have 3 to " + std::to_string(3 + path.modes) +
+           " columns for " + std::to_string(path.modes) + " inner modes, got " +
+           std::to_string(columns) + ".");
+}
+
+void require_intervals(const Index& intervals, const IntervalPath& path) {
+  for (std::size_t b = 0; b < intervals.shape(0); ++b) {
+    const std::int64_t k = intervals.data()[b];
+    if (k < 0 || std::size_t(k) >= path.intervals)
+      refuse("there is no interval " + std::to_string(k) + " of " +
+             std::to_string(path.intervals) + ".");
+  }
+}
+
 void interpolate(const Input<3>& table, const Input<1>& steps, const Index& intervals,
                  const Input<2>& q, const Input<2>& v, const Input<3>& z, const Input<3>& inner,
                  const Output<3>& out) {
@@ -182,21 +198,29 @@ void interpolate(const Input<3>& table, const Input<1>& steps, const Index& inte
   steps.require_kind("steps");
   const std::size_t Q = table.shape(0), columns = table.shape(2), B = steps.shape(0);
   table.require("table", {Q, 3, columns});
-  if (columns < 3 || columns > 3 + path.modes)
-    refuse("table must have 3 to " + std::to_string(3 + path.modes) + " columns for " +
-           std::to_string(path.modes) + " inner modes, got " + std::to_string(columns) + ".");
+  require_columns("table", columns, path);
   intervals.require("intervals", {B});
   q.require("q", {path.intervals + 1, path.dof});
   out.require("out", {3, B * Q, path.dof});
-  for (std::size_t b = 0; b < B; ++b) {
-    const std::int64_t k = intervals.data()[b];
-    if (k < 0 || std::size_t(k) >= path.intervals)
-      refuse("there is no interval " + std::to_string(k) + " of " +
-             std::to_string(path.intervals) + ".");
-  }
+  require_intervals(intervals, path);
   const nb::gil_scoped_release released;
   hovi::intervals::interpolate(path, q.data(), table.data(), Q, columns, steps.data(),
                                intervals.data(), B, out.data());
+}
+
+void changes_at(const Input<2>& rows, const Input<1>& steps, const Index& intervals,
+                const Input<2>& v, const Input<3>& z, const Input<3>& inner, const Output<2>& out) {
+  const IntervalPath path = path_of(v, z, inner);
+  rows.require_kind("rows");
+  const std::size_t count = rows.shape(0), columns = rows.shape(1);
+  require_columns("rows", columns, path);
+  steps.require("steps", {path.intervals});
+  intervals.require("intervals", {count});
+  out.require("out", {count, path.dof});
+  require_intervals(intervals, path);
+  const nb::gil_scoped_release released;
+  hovi::intervals::changes_at(path, rows.data(), columns, steps.data(), intervals.data(), count,
+                              out.data());
 }
 
 double misfit(const Input<1>& steps, const Input<2>& q, const Input<2>& v, const Input<3>& z,
@@ -282,6 +306,8 @@ NB_MODULE(intervals, m) {
   m.def("add_squares", &add_squares, "intervals"_a, "joints"_a, "rows"_a, "weights"_a, "sums"_a);
   m.def("interpolate", &interpolate, "table"_a, "steps"_a, "intervals"_a, "q"_a, "v"_a, "z"_a,
         "inner"_a, "out"_a);
+  m.def("changes_at", &changes_at, "rows"_a, "steps"_a, "intervals"_a, "v"_a, "z"_a, "inner"_a,
+        "out"_a);
   m.def("misfit", &misfit, "steps"_a, "q"_a, "v"_a, "z"_a, "inner"_a);
   m.def("move", &move, "step"_a, "steps"_a, "nodal"_a, "v"_a, "z"_a, "inner"_a, "dq"_a, "new_v"_a,
         "new_z"_a, "new_inner"_a);

@@ -45,6 +45,23 @@ inline void interpolate(const IntervalPath& path, const double* q, const double*
   }
 }
 
+// x of q = q0 (+) x at instants, (count, n), from a row for each, (count, columns), over
+// (h v0, h^2 z0, h^2 z1, h^2 inner) of its interval. steps: h of all intervals.
+inline void changes_at(const IntervalPath& path, const double* rows, std::size_t columns,
+                       const double* steps, const std::int64_t* numbers, std::size_t count,
+                       double* out) {
+  const std::size_t n = path.dof;
+  for (std::size_t e = 0; e < count; ++e, rows += columns, out += n) {
+    const std::size_t k = numbers[e];
+    const double h = steps[k];
+    const double *const z = path.z + 2 * k * n, *const inner = path.inner + k * path.modes * n;
+    std::fill_n(out, n, 0.0);
+    add_scaled(rows[0] * h, path.v + k * n, n, out);
+    for (std::size_t i = 1; i < columns; ++i)
+      add_scaled(rows[i] * h * h, i < 3 ? z + (i - 1) * n : inner + (i - 3) * n, n, out);
+  }
+}
+
 // The largest of |q1 - q0 - h v0 - h^2 z0| and |h (v1 - v0 - h z1)|, relative to the largest |q| or
 // to one; not a number where the path has one that is not finite.
 inline double misfit(const IntervalPath& path, const double* q, const double* steps) {

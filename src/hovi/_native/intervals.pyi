@@ -24,6 +24,9 @@ def interpolate(
     inner: Array,
     out: Array,
 ) -> None: ...
+def changes_at(
+    rows: Array, steps: Array, intervals: Index, v: Array, z: Array, inner: Array, out: Array
+) -> None: ...
 def misfit(steps: Array, q: Array, v: Array, z: Array, inner: Array) -> float: ...
 def move(
     step: Array,

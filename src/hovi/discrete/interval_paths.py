@@ -56,6 +56,21 @@ def interpolate_any(
     )
 
 
+def changes_at(rows: Array, steps: Array, intervals: Index, path: DiscretePath) -> Array:
+    """x of q = q0 (+) x at instants, shape (E, n).
+
+    rows: of x over (h q0', ..., h^(k-1) q0^(k-1), h^k z, h^k inner), shape (E, 2 k - 1 + r).
+    steps: h of all intervals, (N,). intervals: numbers of those of the instants, (E,).
+    """
+    if path.order != 2:
+        modes = rows.shape[1] - 2 * path.order + 1
+        data = scaled_data(path, intervals, steps[intervals, None], modes)
+        return np.asarray(np.matmul(rows[:, None], data)[:, 0])
+    out = np.empty((len(rows), path.v.shape[1]))
+    native.changes_at(rows, steps, intervals, path.v, path.z, path.inner, out)
+    return out
+
+
 def scaled_data(path: DiscretePath, intervals: Index, steps: Array, modes: int) -> Array:
     """(h q0', ..., h^(k-1) q0^(k-1), h^k z, h^k inner) of some intervals, (B, 2 k - 1 + r, n).
 

@@ -162,6 +162,7 @@ class EquationModel(QuadraticModel):
         self.penalty = penalty
         self.intervals = inner.intervals
         self.gradient = inner.gradient
+        self._with_equations: EquationFactor | None = None
 
     def scatter(self, local: Array) -> Array:
         """As that of the model alone."""
@@ -176,7 +177,9 @@ class EquationModel(QuadraticModel):
         return self.inner.metric_product(s)
 
     def factor(self, shift: float) -> Factor | None:
-        """That of H + shift D, with equations for a shift of zero."""
+        """That of H + shift D, with equations for a shift of zero, which is kept."""
+        if shift == 0.0 and self._with_equations is not None:
+            return self._with_equations
         inner = self.inner.factor(shift)
         if inner is None or shift != 0.0:
             return inner
@@ -184,7 +187,9 @@ class EquationModel(QuadraticModel):
         values, vectors = np.linalg.eigh(self.rows @ solved.T)
         stiff = values * self.penalty > LEAST_STIFFNESS
         some = vectors[:, stiff]
-        return EquationFactor(inner, self.rows, solved, (some / values[stiff]) @ some.T)
+        inverse = (some / values[stiff]) @ some.T
+        self._with_equations = EquationFactor(inner, self.rows, solved, inverse)
+        return self._with_equations
 
     def descend(self, factor: Factor) -> tuple[Array, float, float]:
         """See QuadraticModel.descend; z c is added to the slope, as for a bound of a border."""

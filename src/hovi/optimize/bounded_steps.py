@@ -35,6 +35,9 @@ SHORTER_SHARES = 0.8, 0.6, 0.4, 0.2, 0.1, 0.03, 0.01, 1e-3
 """Shares of the longest step that are tried: of a plain one as long as they predict more, so that
 it ends away from the bounds; of a corrected one until one of them predicts a decrease."""
 
+HELD_SHARE = 0.1
+"""Share of a step from which it takes all of the change of the multipliers of equations; a shorter
+one takes as much less of it, since what bounds cut to next to nothing says little about them."""
 ALIKE, MOST_GROWTH = 0.05, 4.0
 """Relative difference of the actual and the predicted decrease up to which the radius grows by the
 second of these, if the objective reopens; others begin with a radius that is wide enough."""
@@ -59,7 +62,7 @@ class BoundedStep:
     decrease: predicted decrease of the merit function.
     remaining: decrease that the whole direction predicts for the objective with its barrier.
     barrier: of the current point, with the mu that the step aims at. before: its merit there.
-    reaction: change of the multipliers of equations in the whole step; None without any.
+    reaction: change of the multipliers of equations that goes with it; None without any.
     """
 
     trial: Trial
@@ -182,15 +185,15 @@ class BoundedSteps(Generic[X]):
         gradient = model.gradient if pulled is None else model.gradient + pulled
         norm2 = trial.norm**2 if pulled is None else float(np.vdot(s, model.metric_product(s)))
         whole, reaction = -float(np.vdot(gradient, s)), model.reaction(gradient, trial.factor)
-        if reaction is not None:
-            whole += reaction[1]
-            slope -= reaction[1]  # the merit function has the multipliers after the step
+        reacted = 0.0 if reaction is None else reaction[1]
+        whole += reacted
         square = whole - trial.shift * norm2
         square -= float(np.vdot(weights * self.sigma, along.dy**2))
         before = barrier.merit(y, self.penalty, along, 0.0)
 
         def decrease(share: float) -> float:
-            smooth = share * slope + 0.5 * share**2 * square
+            # the merit function has the multipliers after the step
+            smooth = share * (slope - _held(share) * reacted) + 0.5 * share**2 * square
             return before - barrier.merit(y, self.penalty, along, share) - smooth
 
         inside = along.primal >= 1.0  # a slack at the end of a whole step is kept off its bound
@@ -204,7 +207,7 @@ class BoundedSteps(Generic[X]):
                 break
             share, predicted = shorter * longest, other
         trial = trial._replace(step=s, norm=math.sqrt(max(norm2, 0.0)))
-        change = None if reaction is None else reaction[0]
+        change = None if reaction is None else _held(share) * reaction[0]
         return BoundedStep(trial, along, share, predicted, 0.5 * whole, barrier, before, change)
 
     def radius_after(self, step: BoundedStep, ratio: float) -> float:
@@ -241,3 +244,8 @@ class BoundedSteps(Generic[X]):
     @property
     def _measure(self) -> float:
         return self.objective.bounds.measure
+
+
+def _held(share: float) -> float:
+    """What a share of a step takes of the change of the multipliers of equations, relative."""
+    return min(1.0, share / HELD_SHARE)

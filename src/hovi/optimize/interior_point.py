@@ -40,7 +40,7 @@ from hovi.optimize.bounded_objective import (
     BoundedOutcome,
     Refinement,
 )
-from hovi.optimize.bounded_steps import SHORT_SHARE, BoundedStep, BoundedSteps
+from hovi.optimize.bounded_steps import MATCHED, SHORT_SHARE, BoundedStep, BoundedSteps
 from hovi.optimize.quadratic_model import QuadraticModel, decrease_ratio, next_shift
 from hovi.optimize.trust_region import Iteration, Options, Stop
 from hovi.system.deadline import raise_if_late
@@ -84,7 +84,7 @@ LEAST_RAISED_GAP = 1e-9
 MOST_HANDED = 5e-3
 """How far outside its bounds a new output may be that takes over the forces of those beside it."""
 OUTSIDE_RADIUS = 3.0
-"""The largest radius when outputs are added outside of their bounds."""
+"""The largest radius when outputs are added outside of their bounds, until they are matched."""
 DENSITY_FLOOR = 1e-9
 """Mean density of the initial objective below which 1 is used as its scale."""
 MAX_FORCE = 1e12
@@ -155,6 +155,7 @@ class _Iteration(BoundedSteps[X]):
         self.marks = outcome.marks
         self.marked = 0.0
         self.cut = 0
+        self.radius_before = 0.0
 
     def run(self) -> None:
         """Iterate until stationary, or until a limit is reached."""
@@ -235,7 +236,10 @@ class _Iteration(BoundedSteps[X]):
         self._raise_mu(step)
         self.cautious = self.plain
         self.product = outcome.barrier.mean_product()
-        self.violations.append(float(outcome.violation.max(initial=0.0)))
+        violation = float(outcome.violation.max(initial=0.0))
+        if violation <= MATCHED:
+            self.radius, self.radius_before = max(self.radius, self.radius_before), 0.0
+        self.violations.append(violation)
         self._mark(x)
         return True
 
@@ -352,13 +356,15 @@ class _Iteration(BoundedSteps[X]):
         outcome, kept = self.outcome, self.outcome.kept
         outputs = self.objective.outputs(outcome.x)  # these may run out of time, so first of all
         if kept is not None:
-            kept = kept[0], self.objective.outputs(kept[0])
+            last = kept[0] is outcome.x
+            kept = kept[0], outputs if last else self.objective.outputs(kept[0])
         before = outcome.outputs.y[found.kept]
         barrier = outcome.barrier.refined(
             self.objective.bounds, outputs.y, found.kept, found.origin, before
         )
         beyond = barrier.outside(outputs.y)
         if beyond[len(found.kept) :].any():
+            self.radius_before = max(self.radius, self.radius_before)
             self.radius = min(self.radius, OUTSIDE_RADIUS)
         if found.handed is not None:
             new, beside = found.handed

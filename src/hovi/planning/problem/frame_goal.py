@@ -16,6 +16,7 @@ import pinocchio as pin
 from hovi.checks.arguments import check_arguments
 from hovi.checks.directions import unit_vector
 from hovi.checks.shapes import numbers_of
+from hovi.dynamics.point_function import PointFunction
 from hovi.dynamics.symbolic_dynamics import casadi_functions
 from hovi.errors import InputError
 from hovi.planning.problem.kinematics.orientation import ORIENTATIONS, rotation_from
@@ -172,7 +173,7 @@ class FrameCondition(Condition):
         """sum_i weights_i d2 c_i."""
         n = self.robot.nv
         curvature = np.zeros((2, n, 2, n))
-        curvature[0, :, 0] = self._curvature(q, weights).full()
+        curvature[0, :, 0] = self._curvature(q[None], weights[None])[0][0]
         return curvature
 
     def pose_error(self, q: Array) -> tuple[float, float]:
@@ -192,13 +193,11 @@ class FrameCondition(Condition):
         """c and its Jacobian by the numbers of q: at the last ones several terms ask for them."""
 
         def evaluated(numbers: bytes) -> tuple[Array, Array]:
-            # np.asarray of c and J would turn an interrupt into a SystemError
-            c, J = self._linear(np.frombuffer(numbers))
+            c, J = self._linear(np.frombuffer(numbers)[None])
             jacobian = np.zeros((self.size, 2, self.robot.nv))
-            jacobian[:, 0] = J.full()
-            value = c.full().ravel()
-            value.flags.writeable = jacobian.flags.writeable = False
-            return value, jacobian
+            jacobian[:, 0] = J.reshape(self.size, -1)
+            c.flags.writeable = jacobian.flags.writeable = False
+            return c[0], jacobian
 
         return lru_cache(maxsize=KEPT)(evaluated)
 
@@ -229,17 +228,17 @@ class FrameCondition(Condition):
         return ca.vertcat(*rows)
 
     @cached_property
-    def _linear(self) -> ca.Function:
+    def _linear(self) -> PointFunction:
         symbols, c = self._symbols
         J = jacobian(c, symbols, self.robot.curved_space)[:, : self.robot.nv]
-        return ca.Function("c", [symbols[0]], [c, J])
+        return PointFunction(ca.Function("c", [symbols[0]], [c, J]))
 
     @cached_property
-    def _curvature(self) -> ca.Function:
+    def _curvature(self) -> PointFunction:
         symbols, c = self._symbols
         n, weights = self.robot.nv, ca.SX.sym("weights", c.shape[0])
         H = hessian(ca.dot(weights, c), symbols, self.robot.curved_space)[0][:n, :n]
-        return ca.Function("ddc", [symbols[0], weights], [H])
+        return PointFunction(ca.Function("ddc", [symbols[0], weights], [H]))
 
 
 def _numbers(name: str, value: Any) -> Array:

@@ -279,10 +279,10 @@ class ActionObjective(Objective[DiscretePath]):
             k, columns, scale = self._place(each.node)
             q, v = x.q[each.node], x.v[each.node]
             c, J = each.condition.evaluate(q, v)  # (s,), (s, 2, n)
-            force = mu + rho * c
-            curvature = rho * np.einsum("sin,sjm->injm", J, J)
-            curvature += each.condition.curvature(q, v, force)
-            expansion.gradient[k, columns] += np.tensordot(force, J, 1) * scale[:, None]
+            force, flat = mu + rho * c, J.reshape(len(c), -1)
+            curvature = each.condition.curvature(q, v, force)
+            curvature += rho * (flat.T @ flat).reshape(curvature.shape)
+            expansion.gradient[k, columns] += (force @ flat).reshape(2, -1) * scale[:, None]
             curvature *= scale[:, None, None, None] * scale[:, None]
             expansion.hessian[k, columns, columns] += curvature.transpose(0, 2, 1, 3)
 

@@ -98,6 +98,10 @@ class BoundedAction(BoundedObjective[DiscretePath]):
     def outputs(self, x: DiscretePath) -> Outputs:
         """The discrete action, and the bounded outputs relative to their ranges."""
         outputs = self.action.outputs(x)
+        return Outputs(self.action.value_of(x, outputs), self._bounded_outputs(x, outputs))
+
+    def _bounded_outputs(self, x: DiscretePath, outputs: list[Array]) -> Array:
+        """Those at the points, then those of the rows, (R,), from the Lagrangian's outputs."""
         first = self._jet_size
         if self.columns.min(initial=first) >= first:  # such as torques, while rows bound q, v and a
             every = outputs[0] if len(outputs) == 1 else np.concatenate(outputs)
@@ -106,8 +110,7 @@ class BoundedAction(BoundedObjective[DiscretePath]):
             y = self._scaled(self._at_all_points(x, outputs))
         if self.more is not None:
             y = np.concatenate([y, self.more.values(self._configurations(x))], axis=1)
-        y = y.ravel() if self.rows is None else np.append(y, self.rows.values(x))
-        return Outputs(self.action.value_of(x, outputs), y)
+        return y.ravel() if self.rows is None else np.append(y, self.rows.values(x))
 
     def _at_all_points(self, x: DiscretePath, outputs: list[Array]) -> Array:
         """(q, v, ..., outputs) at all points, shape (P, size)."""

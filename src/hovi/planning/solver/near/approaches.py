@@ -7,7 +7,6 @@ import numpy.typing as npt
 
 from hovi.discrete.grid import DiscretePath
 from hovi.discrete.instants import InstantBatch
-from hovi.discrete.interval_paths import scaled_data
 from hovi.discrete.state import State
 from hovi.planning.clearance.clearance import DISTANCE_SCALE
 from hovi.planning.clearance.distances import Distances
@@ -75,10 +74,9 @@ class Approaches:
 
 def configurations(problem: TrajectoryProblem, path: DiscretePath, batch: InstantBatch) -> Array:
     """q at instants, (M, nq), on vector spaces and commutative groups."""
-    steps = problem.grid.steps
-    data = scaled_data(path, np.arange(len(steps)), steps[:, None], batch.modes)[batch.numbers]
-    x = np.matmul(batch.table[:, :1], data)[:, 0]
-    return np.asarray(problem.coordinates.integrate(path.q[batch.numbers], x))
+    q, x = path.q[batch.numbers], batch.changes(path)
+    on = problem.coordinates
+    return q + x if on.vector_joints else np.asarray(on.integrate(q, x))
 
 
 def spread(problem: TrajectoryProblem, number: int) -> InstantBatch:

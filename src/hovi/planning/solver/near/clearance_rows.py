@@ -121,11 +121,13 @@ class ClearanceRows:
 
     def _measured_excess(self, path: DiscretePath, chosen: Mask) -> Array:
         """What distances exceed the least one by in chosen rows, (E,); NaN in others."""
-        instants, place = np.unique(self._instant[chosen], return_inverse=True)
-        column = self._column[chosen]
-        wanted = np.zeros((len(instants), self._wanted.shape[1]), dtype=bool)
+        instant, column = self._instant[chosen], self._column[chosen]
+        used = np.zeros(len(self._wanted), dtype=bool)
+        used[instant] = True
+        place = (np.cumsum(used) - 1)[instant]
+        wanted = np.zeros((int(place.max()) + 1, self._wanted.shape[1]), dtype=bool)
         wanted[place, column] = True
-        q, sizes = self._configurations(path)[instants], self._sizes[instants]
+        q, sizes = self._configurations(path)[used], self._sizes[used]
         normals = np.zeros((*wanted.shape, 3))
         normals[place, column] = self._normals[chosen]
         d = self._some.values(q, self._reach, wanted, sizes, normals)

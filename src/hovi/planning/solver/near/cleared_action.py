@@ -21,6 +21,7 @@ from hovi.planning.solver.limits.limit_rows import LimitRows
 from hovi.planning.solver.multipliers import Multipliers
 from hovi.planning.solver.near.clearance_rows import ClearanceRows
 from hovi.planning.solver.near.expanded_rows import ExpandedRows
+from hovi.planning.solver.near.recent_paths import RecentPaths
 from hovi.scene.lagrangian import PointTerms
 
 Array = npt.NDArray[np.float64]
@@ -57,6 +58,7 @@ class ClearedAction(BoundedAction):
     ) -> None:
         self.near = near
         near.stand_behind(rows)
+        self._limited = RecentPaths[Array]()
         super().__init__(problem, limits, margins, algebra, multipliers, None, rows)
         self._near: ExpandedRows | None = None
         self._force = np.zeros(0)
@@ -84,6 +86,14 @@ class ClearedAction(BoundedAction):
             return base
         value = np.inf if self.near.hidden_depth(x) > DEEPEST else base.value
         return Outputs(value, self._ordered(np.append(base.y, self.near.values(x))))
+
+    def _bounded_outputs(self, x: DiscretePath, outputs: list[Array]) -> Array:
+        """Those without distances, which are kept for the last paths."""
+        known = self._limited.get(x)
+        if known is None:
+            known = super()._bounded_outputs(x, outputs)
+            self._limited = self._limited.with_entry(x, known)
+        return known
 
     def model(
         self, x: DiscretePath, sigma: Array, rho: Array, multipliers: Array
@@ -160,6 +170,7 @@ class ClearedAction(BoundedAction):
             return None
         kept, origin = np.arange(before), np.zeros(0, dtype=np.intp)
         if found is not None:
+            self._limited = RecentPaths()
             kept, origin = found.kept, found.origin
         return self._renumbered(order, before, kept, origin, added)
 
