@@ -92,5 +92,7 @@ def test_the_least_distance_of_a_motion_is_that_of_all_obstacles() -> None:
     assert found.problem is not None
     assert found.problem.distances is None
     assert (found.cost, found.nit) == (alone.cost, alone.nit)
-    assert found.margins().distance == pytest.approx(8.0, abs=1.0)
+    margins = found.margins()
+    assert margins.distance == pytest.approx(8.0, abs=1.0)
+    assert margins.pair.endswith("and obstacle 'far'")
     assert found.trajectory.metadata["clearance"]["obstacles"][0]["name"] == "far"

@@ -25,15 +25,20 @@ def limit_margins(motion: Solution | Trajectory) -> LimitMargins | None:
 
 def least_distance(motion: Solution | Trajectory) -> float | None:
     """The least distance of any pair, in [m]; None for a plan without obstacles."""
+    return nearest_pair(motion)[0]
+
+
+def nearest_pair(motion: Solution | Trajectory) -> tuple[float | None, str]:
+    """The least distance, and its pair as messages name it; None and "" without obstacles."""
     kept = _distances_of(motion)
-    return None if kept is None else margins.least_distance(_trajectory_of(motion), *kept)
+    return (None, "") if kept is None else margins.nearest_pair(_trajectory_of(motion), *kept)
 
 
 @dataclass(frozen=True)
 class KnownMargins:
     """What a report shows of the margins of a motion, and whether the motion is usable.
 
-    limits, distance, segments: as hovi.Margins; None, or none, without limits or obstacles.
+    limits, distance, segments, pair: as hovi.Margins; None, or none, without limits or obstacles.
     violation: as Solution.violation; None if it is not known.
     missing: why the rest is not known; "" if all is.
     """
@@ -43,6 +48,7 @@ class KnownMargins:
     segments: Mapping[str, LimitMargins] = field(default_factory=dict)
     violation: str | None = None
     missing: str = ""
+    pair: str = ""
 
     @classmethod
     def of(cls, solution: Solution, deadline: Deadline) -> KnownMargins:
@@ -58,7 +64,8 @@ class KnownMargins:
                 motion = solution.trajectory
                 limits, segments = margins.limit_margins(motion, _limits_of(solution))
                 violation = solution.violation if solution.problem is not None else None
-                return cls(limits, least_distance(solution), segments, violation)
+                distance, pair = nearest_pair(solution)
+                return cls(limits, distance, segments, violation, pair=pair)
         except OutOfTimeError as late:
             return cls(limits, None, segments, violation, str(late))
 

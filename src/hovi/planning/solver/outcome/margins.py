@@ -93,17 +93,20 @@ class Margins:
     distance: the least distance to obstacles and, with self-collision, between links, in [m]; None
         for a plan without either.
     segments: of a sequence, the margins to the limits of each segment, by its name.
+    pair: which come nearest, as messages name it; "" for a plan without obstacles.
     """
 
     limits: LimitMargins | None = None
     distance: float | None = None
     segments: Mapping[str, LimitMargins] = field(default_factory=dict)
+    pair: str = ""
 
     def __str__(self) -> str:
         """The tightest limit of the motion and of each segment, and the least distance."""
         known = ["no limits" if self.limits is None else str(self.limits)]
         known += [f"{name!r}: {each}" for name, each in self.segments.items()]
-        known += [] if self.distance is None else [f"least distance {self.distance:.4g} m"]
+        if self.distance is not None:
+            known.append(f"least distance {self.distance:.4g} m, of {self.pair}")
         return "\n".join(known)
 
 
@@ -114,8 +117,10 @@ def margins_of(problem: TrajectoryProblem, motion: Trajectory) -> Margins:
     """
     limits, segments = limit_margins(motion, problem.limits)
     bounded = all_distances(problem)
-    least = None if bounded is None else least_distance(motion, *bounded)
-    return Margins(limits, least, segments)
+    if bounded is None:
+        return Margins(limits, None, segments)
+    distance, pair = nearest_pair(motion, *bounded)
+    return Margins(limits, distance, segments, pair)
 
 
 def all_distances(problem: TrajectoryProblem) -> tuple[Clearance, Distances] | None:
@@ -151,5 +156,14 @@ def limit_margins(
 
 def least_distance(motion: Trajectory, clearance: Clearance, distances: Distances) -> float:
     """The least distance of any pair, in [m], which may be smaller where shapes may touch."""
+    return nearest_pair(motion, clearance, distances)[0]
+
+
+def nearest_pair(
+    motion: Trajectory, clearance: Clearance, distances: Distances
+) -> tuple[float, str]:
+    """The least distance, as `least_distance`, and the pair, as messages name it."""
     approach = approach_along(motion, distances, clearance.margin)
-    return float((approach.distance - distances.allowance).min())
+    closest = (approach.distance - distances.allowance).min(axis=0)
+    pair = int(np.argmin(closest))
+    return float(closest[pair]), str(distances.pairs[pair])
