@@ -56,7 +56,7 @@ def test_the_distance_of_a_solution_comes_from_its_problem(limited: Solution) ->
 
 def test_the_pair_that_comes_nearest_is_named(arm_scene: hovi.Scene) -> None:
     """Of two balls the nearer one, whichever is given first."""
-    far = Sphere([30.0, 0.0, 0.0], 0.1, name="far ball")
+    far = Sphere([-5.0, 0.0, 0.0], 0.1, name="far ball")
     for balls in ([BALL, far], [far, BALL]):
         known = KnownMargins.of(planned(arm_scene, obstacles=balls), Deadline(None))
         assert known.pair.endswith("and obstacle 'ball'")

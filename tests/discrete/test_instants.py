@@ -11,7 +11,7 @@ import pytest
 import hovi
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import DiscretePath, Grid
-from hovi.discrete.instants import Instants
+from hovi.discrete.instants import InstantBatch, Instants
 from hovi.discrete.state import State
 from hovi.errors import InputError
 from hovi.planning.problem.problem import TrajectoryProblem
@@ -107,6 +107,17 @@ def test_jets_at_instants_are_those_of_the_trajectory(name: str, grid: Grid) -> 
     np.testing.assert_allclose(problem.ld.point_weights[-1], WHERE.weights)
 
 
+@each_grid
+@pytest.mark.parametrize("name", ["vector space", "continuous"])
+def test_changes_at_instants_lead_to_the_configurations_there(name: str, grid: Grid) -> None:
+    problem = problem_of(name, grid)
+    path, _ = wavy(problem)
+    batch = InstantBatch(grid, WHERE.intervals, WHERE.positions, WHERE.weights)
+    found = problem.coordinates.integrate(path.q[WHERE.intervals], batch.changes(path))
+    q = problem.trajectory(path).jet_intervals(WHERE.intervals, WHERE.positions)[0]
+    np.testing.assert_allclose(found, q, rtol=1e-12, atol=1e-13)
+
+
 @pytest.mark.parametrize("order", [1, 3, 4])
 def test_jets_at_instants_are_those_of_the_trajectory_for_other_orders(order: int) -> None:
     grid = Grid(STEPS, (galerkin(2, order),) * 4)
@@ -117,6 +128,8 @@ def test_jets_at_instants_are_those_of_the_trajectory_for_other_orders(order: in
     path = dataclasses.replace(path, inner=random.normal(size=path.inner.shape))
     *_, found = ld.jets(path)
     expected = problem.trajectory(path).jet_intervals(WHERE.intervals, WHERE.positions, order)
+    batch = InstantBatch(grid, WHERE.intervals, WHERE.positions, WHERE.weights)
+    np.testing.assert_allclose(path.q[WHERE.intervals] + batch.changes(path), expected[0])
     for one, other in zip(found, expected, strict=True):
         np.testing.assert_allclose(one, other, rtol=1e-11, atol=1e-11)
 

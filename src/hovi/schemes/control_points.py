@@ -64,6 +64,6 @@ def _of_part(
 ) -> tuple[Array, Array]:
     """As `control_rows`, of one part: (d + 1, 2 k - 1 + r) each."""
     d = control_degree(k, inner_modes, derivative)
-    nodes, beside = left + width * control_nodes(d), left + width * np.linspace(0.0, 1.0, d + 1)
-    at_nodes, at_points = (jet_rows(s, k, inner_modes)[:, derivative] for s in (nodes, beside))
-    return np.asarray(control_matrix(d) @ at_nodes), np.asarray(at_points)
+    s = left + width * np.append(control_nodes(d), np.linspace(0.0, 1.0, d + 1))
+    at_nodes, at_points = np.split(jet_rows(s, k, inner_modes)[:, derivative], 2)
+    return np.asarray(control_matrix(d) @ at_nodes), at_points
