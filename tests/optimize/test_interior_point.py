@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable
 
 import casadi as ca
@@ -395,6 +396,16 @@ def test_the_model_at_the_end_is_exact_although_it_is_not_convex() -> None:
     assert outcome.model.factor(0.0) is None
 
 
+def test_the_violation_follows_outputs_and_slacks() -> None:
+    program = Program(2, lambda x: x[0] + x[1], lambda x: [x[0], x[1]], [0, 0], [1, 1])
+    outcome = minimize_bounded(program, np.array([0.5, 0.5]), Options())
+    assert outcome.violation <= 1e-9
+    outcome.outputs = program.outputs(outcome.x + [0.25, -0.5])
+    assert outcome.violation == pytest.approx(0.5)
+    outcome.barrier = dataclasses.replace(outcome.barrier, s=outcome.outputs.y + 0.125)
+    assert outcome.violation == pytest.approx(0.125)
+
+
 def test_limits_and_interrupts_return_the_current_point() -> None:
     n, f, y, lower, upper, start, _ = PROGRAMS["hock-schittkowski 43, from outside"]
     x = np.array(start, dtype=float)
@@ -622,7 +633,7 @@ def test_out_of_time_the_kept_point_has_the_outputs_of_the_last_bounds(steps: in
 
     stopped = minimize_bounded(program, np.array([3.0, 3.0]), Options(), late)
     np.testing.assert_allclose(stopped.outputs.y, program.outputs(stopped.x).y)
-    assert stopped.violation.shape == program.bounds.lower.shape
+    assert stopped.barrier.s.shape == stopped.outputs.y.shape == program.bounds.lower.shape
 
 
 @pytest.mark.parametrize("calls", range(3, 30))
@@ -640,7 +651,7 @@ def test_out_of_time_within_the_outputs_the_outcome_is_of_one_set_of_bounds(call
 
     stopped = minimize_bounded(Slow(), np.array([3.0, 3.0]), Options())
     assert stopped.stop in (Stop.TIME_LIMIT, Stop.STATIONARY)
-    assert stopped.violation.shape == stopped.barrier.zl.shape == stopped.outputs.y.shape
+    assert stopped.barrier.s.shape == stopped.barrier.zl.shape == stopped.outputs.y.shape
 
 
 def test_the_kept_point_is_the_best_one_within_the_bounds() -> None:

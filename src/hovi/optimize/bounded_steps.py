@@ -219,7 +219,7 @@ class BoundedSteps(Generic[X]):
             return max(radius, MOST_GROWTH * last)
         if step.trial.newton or step.share >= SHORT_SHARE:
             return radius
-        if self.outcome.violation.max(initial=0.0) <= MATCHED:
+        if self.outcome.violation <= MATCHED:
             return min(radius, max(CUT_RADIUS * length, LEAST_CUT_RADIUS))
         if not reopens:
             return radius

@@ -236,7 +236,7 @@ class _Iteration(BoundedSteps[X]):
         self._raise_mu(step)
         self.cautious = self.plain
         self.product = outcome.barrier.mean_product()
-        violation = float(outcome.violation.max(initial=0.0))
+        violation = outcome.violation
         if violation <= MATCHED:
             self.radius, self.radius_before = max(self.radius, self.radius_before), 0.0
         self.violations.append(violation)
@@ -270,7 +270,7 @@ class _Iteration(BoundedSteps[X]):
     def _reopened(self) -> bool:
         """Whether the slacks were moved away from their bounds again, to go on from there."""
         outcome, objective = self.outcome, self.objective
-        outside = float(outcome.violation.max(initial=0.0))
+        outside = outcome.violation
         if not objective.reopens or self.reopenings >= MAX_REOPENINGS or outside > LARGEST_REOPENED:
             return False
         self.reopenings += 1
@@ -315,7 +315,7 @@ class _Iteration(BoundedSteps[X]):
         solved = (
             step.trial.newton
             and step.decrease <= 10 * barrier.mu * self._measure
-            and outcome.violation.max(initial=0.0) <= max(FEASIBILITY_TOLERANCE, 0.1 * share)
+            and outcome.violation <= max(FEASIBILITY_TOLERANCE, 0.1 * share)
             and barrier.complementarity() <= 10 * barrier.mu
         )
         if solved:
@@ -339,7 +339,7 @@ class _Iteration(BoundedSteps[X]):
     def _refined(self, at_end: bool) -> bool:
         """Whether outputs were replaced by others, which bound less."""
         level, outcome = self.product / self.density, self.outcome
-        early = level > self.level or outcome.violation.max(initial=0.0) > level
+        early = level > self.level or outcome.violation > level
         if early and not at_end:
             return self._replaced(self.objective.refine_at_once(outcome.x))
         if self.refinements >= MAX_REFINEMENTS:

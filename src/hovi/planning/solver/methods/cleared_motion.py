@@ -204,7 +204,7 @@ def _rough_with_distances(
     search.near.watchful = True
     known = first_multipliers(problem, moved) if problem.constrained else None
     outcome, known = _rough(search, moved, known, FIRST_MU, most)
-    violation = float(outcome.violation.max(initial=0.0))
+    violation = outcome.violation
     if outcome.stop is Stop.DIVERGED or violation > ROUGH_VIOLATION:
         return None
     if known is not None and len(problem.passive) > 0:
