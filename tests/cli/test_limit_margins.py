@@ -59,7 +59,8 @@ def test_the_pair_that_comes_nearest_is_named(arm_scene: hovi.Scene) -> None:
     far = Sphere([-5.0, 0.0, 0.0], 0.1, name="far ball")
     for balls in ([BALL, far], [far, BALL]):
         known = KnownMargins.of(planned(arm_scene, obstacles=balls), Deadline(None))
-        assert known.pair.endswith("and obstacle 'ball'")
+        assert known.nearest_pair is not None
+        assert known.nearest_pair.endswith("and obstacle 'ball'")
 
 
 def test_the_margins_of_a_solution_without_a_problem_come_from_its_metadata(

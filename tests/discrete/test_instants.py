@@ -109,11 +109,11 @@ def test_jets_at_instants_are_those_of_the_trajectory(name: str, grid: Grid) -> 
 
 @each_grid
 @pytest.mark.parametrize("name", ["vector space", "continuous"])
-def test_changes_at_instants_lead_to_the_configurations_there(name: str, grid: Grid) -> None:
+def test_displacements_at_instants_lead_to_the_configurations_there(name: str, grid: Grid) -> None:
     problem = problem_of(name, grid)
     path, _ = wavy(problem)
     batch = InstantBatch(grid, WHERE.intervals, WHERE.positions, WHERE.weights)
-    found = problem.coordinates.integrate(path.q[WHERE.intervals], batch.changes(path))
+    found = problem.coordinates.integrate(path.q[WHERE.intervals], batch.displacements(path))
     q = problem.trajectory(path).jet_intervals(WHERE.intervals, WHERE.positions)[0]
     np.testing.assert_allclose(found, q, rtol=1e-12, atol=1e-13)
 
@@ -129,7 +129,7 @@ def test_jets_at_instants_are_those_of_the_trajectory_for_other_orders(order: in
     *_, found = ld.jets(path)
     expected = problem.trajectory(path).jet_intervals(WHERE.intervals, WHERE.positions, order)
     batch = InstantBatch(grid, WHERE.intervals, WHERE.positions, WHERE.weights)
-    np.testing.assert_allclose(path.q[WHERE.intervals] + batch.changes(path), expected[0])
+    np.testing.assert_allclose(path.q[WHERE.intervals] + batch.displacements(path), expected[0])
     for one, other in zip(found, expected, strict=True):
         np.testing.assert_allclose(one, other, rtol=1e-11, atol=1e-11)
 

@@ -211,6 +211,10 @@ def _columns(arguments: Arguments, sizes: Sizes) -> None:
     arguments["table"] = np.resize(arguments["table"], (sizes["Q"], 3, columns))
 
 
+def _row_columns(arguments: Arguments, sizes: Sizes) -> None:
+    arguments["rows"] = np.resize(arguments["rows"], (sizes["E"], 3 + sizes["r"]))
+
+
 _TABLES = {"table": _in("T R m"), "weights": _in("T"), "steps": _in("B")}
 _SELECTION = {"selected": _in("K", "int64"), "scales": _in("K"), "jacobian": _in("P p R*n")}
 _ROWS_OF_INTERVALS = {"intervals": _in("E", "int64"), "joints": _in("E", "int64")}
@@ -704,13 +708,14 @@ ENTRIES: dict[str, Entry] = {
         values=_columns,
         fits=_interval_numbers_fit,
     ),
-    "intervals.changes_at": Entry(
-        intervals.changes_at,
+    "intervals.displacements_at": Entry(
+        intervals.displacements_at,
         {
             **{"rows": _in("E c"), "steps": _in("N"), "intervals": _in("E", "int64")},
             **{**_PATH, "out": _out("E n")},
         },
         letters={"N": (1, 4), "c": (3, 3)},
+        values=_row_columns,
         fits=_interval_numbers_fit,
     ),
     "intervals.misfit": Entry(

@@ -9,7 +9,7 @@ import pytest
 from hovi.optimize.barrier import Barrier, Bounds
 from hovi.optimize.bordered_model import EquationModel
 from hovi.optimize.bounded_objective import BoundedOutcome, Refinement
-from hovi.optimize.bounded_steps import HELD_SHARE, BoundedSteps
+from hovi.optimize.bounded_steps import FULL_REACTION_SHARE, BoundedSteps
 from hovi.optimize.interior_point import OUTSIDE_RADIUS, minimize_bounded
 from hovi.optimize.quadratic_model import QuadraticModel
 from hovi.optimize.trust_region import Options, Stop
@@ -76,8 +76,8 @@ def test_a_step_takes_as_much_of_the_multipliers_as_bounds_leave_of_it(far: floa
     whole = model.reaction(model.gradient, factor)
     assert whole is not None
     assert step.reaction is not None
-    assert (step.share < HELD_SHARE) is (far < 2.0)
-    expected = min(1.0, step.share / HELD_SHARE) * whole[0]
+    assert (step.share < FULL_REACTION_SHARE) is (far < 2.0)
+    expected = min(1.0, step.share / FULL_REACTION_SHARE) * whole[0]
     np.testing.assert_allclose(step.reaction, expected, rtol=1e-12)
 
 
@@ -96,6 +96,27 @@ def test_the_predicted_decrease_of_a_quadratic_program_is_the_actual_one(far: fl
     np.testing.assert_allclose(outcome.x, [x0, x1, x0 + x1 - 0.5], atol=1e-5)
 
 
+@pytest.mark.parametrize("held", [True, False])
+def test_what_bounds_hold_back_of_equations_is_left_to_the_penalty(held: bool) -> None:
+    """The second of two equations, where a barrier is 1000 times as stiff as their penalty."""
+    A, c = np.eye(2, 3), np.array([0.1, 0.2])
+    H = np.eye(3) + PENALTY * A.T @ A
+    H[1, 1] += 1e3 * PENALTY * held
+    inner = DenseModel(PENALTY * A.T @ c, H)
+    model = EquationModel(inner, A, c, PENALTY)  # type: ignore[arg-type]
+    factor = model.factor(0.0)
+    assert factor is not None
+    step, _, _ = model.descend(factor)
+    reaction = model.reaction(model.gradient, factor)
+    assert reaction is not None
+    assert step[0] == pytest.approx(-c[0])
+    if held:
+        assert reaction[0][1] == 0.0
+        assert step[1] == pytest.approx(-1e-3 * c[1], rel=1e-2)
+    else:
+        assert step[1] == pytest.approx(-c[1])
+
+
 class Watched(Quadratic):
     """min |x - target|^2 / 2 within loose bounds, and with one more that is found on the way."""
 
@@ -109,14 +130,14 @@ class Watched(Quadratic):
         return np.arange(len(self.target))
 
     def refine_at_once(self, x: Array) -> Refinement | None:
-        """Once half of the way is gone: x0 is to be at least what it is, and a little more."""
+        """Half way, once: x0 is to be larger by 20, several steps of OUTSIDE_RADIUS."""
         if self.added or np.linalg.norm(x - self.target) > 0.5 * np.linalg.norm(self.target):
             return None
         self.added = True
         before, one = self.bounds, np.zeros((1, len(x)))
         one[0, 0] = 1e-3  # of a range of 1000
         self.A = np.concatenate([self.A, one])
-        lower = np.append(before.lower, 1e-3 * x[0] + 1e-3)
+        lower = np.append(before.lower, 1e-3 * x[0] + 2e-2)
         self.bounds = Bounds(lower, np.append(before.upper, 1e6), np.append(before.weights, 0.1))
         return Refinement(self.kept, np.array([-1]))
 
@@ -131,4 +152,5 @@ def test_the_radius_is_what_it_was_once_added_outputs_are_matched() -> None:
     assert radii[first] <= OUTSIDE_RADIUS < radii[first - 1]
     again = next(i for i, radius in enumerate(radii) if i > first and radius > 10 * OUTSIDE_RADIUS)
     assert radii[again] >= radii[first - 1]
+    assert again > first + 1  # not before the bound that was added is met
     np.testing.assert_allclose(outcome.x, program.target, atol=0.1)

@@ -400,7 +400,7 @@ def test_the_violation_follows_outputs_and_slacks() -> None:
     program = Program(2, lambda x: x[0] + x[1], lambda x: [x[0], x[1]], [0, 0], [1, 1])
     outcome = minimize_bounded(program, np.array([0.5, 0.5]), Options())
     assert outcome.violation <= 1e-9
-    outcome.outputs = program.outputs(outcome.x + [0.25, -0.5])
+    outcome.outputs = program.outputs(outcome.x + np.array([0.25, -0.5]))
     assert outcome.violation == pytest.approx(0.5)
     outcome.barrier = dataclasses.replace(outcome.barrier, s=outcome.outputs.y + 0.125)
     assert outcome.violation == pytest.approx(0.125)

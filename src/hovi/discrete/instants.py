@@ -13,7 +13,7 @@ from hovi.checks.shapes import require_shape
 from hovi.discrete.grid import DiscretePath, Grid
 from hovi.discrete.interval_batch import Coordinates, IntervalBatch, Jet
 from hovi.discrete.interval_charts import Charts, charts_on
-from hovi.discrete.interval_paths import changes_at, scaled_data
+from hovi.discrete.interval_paths import displacements_at, scaled_data
 from hovi.errors import InputError
 from hovi.robot.space.chart import Chart
 from hovi.robot.space.configuration_space import ConfigurationSpace
@@ -112,9 +112,9 @@ class InstantBatch:
         """Those of x alone, (E, 2 k - 1 + r)."""
         return np.ascontiguousarray(self.table[:, 0])
 
-    def changes(self, path: DiscretePath) -> Array:
-        """x of q = q0 (+) x at the instants, (E, n), on vector spaces and commutative groups."""
-        return changes_at(self._position_rows, self.grid.steps, self.numbers, path)
+    def displacements(self, path: DiscretePath) -> Array:
+        """x of q = q0 (+) x at the instants, (E, n): see `displacements_at`."""
+        return displacements_at(self._position_rows, self.grid.steps, self.numbers, path)
 
     @cached_property
     def tables(self) -> dict[Coordinates, Array]:

@@ -56,18 +56,19 @@ def interpolate_any(
     )
 
 
-def changes_at(rows: Array, steps: Array, intervals: Index, path: DiscretePath) -> Array:
-    """x of q = q0 (+) x at instants, shape (E, n).
+def displacements_at(rows: Array, steps: Array, intervals: Index, path: DiscretePath) -> Array:
+    """x of q = q0 (+) x at instants, shape (E, n), on vector spaces and commutative groups.
 
-    rows: of x over (h q0', ..., h^(k-1) q0^(k-1), h^k z, h^k inner), shape (E, 2 k - 1 + r).
-    steps: h of all intervals, (N,). intervals: numbers of those of the instants, (E,).
+    x = row . (h q0', ..., h^(k-1) q0^(k-1), h^k z, h^k inner), with a row for each instant.
+    rows: shape (E, 2 k - 1 + r). steps: h of all N intervals, (N,), in [s]. intervals: the interval
+    of each instant, (E,).
     """
     if path.order != 2:
         modes = rows.shape[1] - 2 * path.order + 1
         data = scaled_data(path, intervals, steps[intervals, None], modes)
         return np.asarray(np.matmul(rows[:, None], data)[:, 0])
     out = np.empty((len(rows), path.v.shape[1]))
-    native.changes_at(rows, steps, intervals, path.v, path.z, path.inner, out)
+    native.displacements_at(rows, steps, intervals, path.v, path.z, path.inner, out)
     return out
 
 

@@ -21,8 +21,10 @@ from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 
-LEAST_STIFFNESS = 1e-6
-"""Eigenvalue of S times the penalty below which a combination of equations is left to it."""
+LEAST_STIFFNESS = 1e-2
+"""Eigenvalue of S times the penalty below which a combination of equations is left to the penalty.
+It is nearly one where nothing holds the combination back. Where bounds do, steps that meet it would
+be cut to nothing, and its multiplier would grow without end."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,7 +179,7 @@ class EquationModel(QuadraticModel):
         return self.inner.metric_product(s)
 
     def factor(self, shift: float) -> Factor | None:
-        """That of H + shift D, with equations for a shift of zero, which is kept."""
+        """That of H + shift D, with equations for a shift of zero, which is cached."""
         if shift == 0.0 and self._with_equations is not None:
             return self._with_equations
         inner = self.inner.factor(shift)

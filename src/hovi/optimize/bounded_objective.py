@@ -149,7 +149,7 @@ class BoundedOutcome(Generic[X]):
     corrected: bool = False
     marks: list[tuple[float, X]] = field(default_factory=list)
     kept: tuple[X, Outputs] | None = None
-    _measured: tuple[Array, Array, float] | None = None
+    _measured: tuple[Array, Array, float] | None = field(default=None, init=False, repr=False)
 
     @property
     def converged(self) -> bool:
@@ -189,7 +189,7 @@ class BoundedOutcome(Generic[X]):
 
     @property
     def violation(self) -> float:
-        """The largest |y - s|, which is kept until outputs or slacks are replaced."""
+        """The largest |y - s|, relative to the ranges; cached, as a step asks up to eight times."""
         y, s, known = self.outputs.y, self.barrier.s, self._measured
         if known is None or known[0] is not y or known[1] is not s:
             known = self._measured = y, s, float(np.abs(y - s).max(initial=0.0))

@@ -35,9 +35,9 @@ SHORTER_SHARES = 0.8, 0.6, 0.4, 0.2, 0.1, 0.03, 0.01, 1e-3
 """Shares of the longest step that are tried: of a plain one as long as they predict more, so that
 it ends away from the bounds; of a corrected one until one of them predicts a decrease."""
 
-HELD_SHARE = 0.1
-"""Share of a step from which it takes all of the change of the multipliers of equations; a shorter
-one takes as much less of it, since what bounds cut to next to nothing says little about them."""
+FULL_REACTION_SHARE = 0.1
+"""Share of a step from which it takes the whole change of the multipliers of equations. A shorter
+one takes share / 0.1 of it: a step that bounds cut to next to nothing says little about them."""
 ALIKE, MOST_GROWTH = 0.05, 4.0
 """Relative difference of the actual and the predicted decrease up to which the radius grows by the
 second of these, if the objective reopens; others begin with a radius that is wide enough."""
@@ -193,7 +193,7 @@ class BoundedSteps(Generic[X]):
 
         def decrease(share: float) -> float:
             # the merit function has the multipliers after the step
-            smooth = share * (slope - _held(share) * reacted) + 0.5 * share**2 * square
+            smooth = share * (slope - _reaction_share(share) * reacted) + 0.5 * share**2 * square
             return before - barrier.merit(y, self.penalty, along, share) - smooth
 
         inside = along.primal >= 1.0  # a slack at the end of a whole step is kept off its bound
@@ -207,7 +207,7 @@ class BoundedSteps(Generic[X]):
                 break
             share, predicted = shorter * longest, other
         trial = trial._replace(step=s, norm=math.sqrt(max(norm2, 0.0)))
-        change = None if reaction is None else _held(share) * reaction[0]
+        change = None if reaction is None else _reaction_share(share) * reaction[0]
         return BoundedStep(trial, along, share, predicted, 0.5 * whole, barrier, before, change)
 
     def radius_after(self, step: BoundedStep, ratio: float) -> float:
@@ -246,6 +246,6 @@ class BoundedSteps(Generic[X]):
         return self.objective.bounds.measure
 
 
-def _held(share: float) -> float:
-    """What a share of a step takes of the change of the multipliers of equations, relative."""
-    return min(1.0, share / HELD_SHARE)
+def _reaction_share(share: float) -> float:
+    """Share of the change of the multipliers of equations that a share of a step takes."""
+    return min(1.0, share / FULL_REACTION_SHARE)

@@ -84,7 +84,8 @@ LEAST_RAISED_GAP = 1e-9
 MOST_HANDED = 5e-3
 """How far outside its bounds a new output may be that takes over the forces of those beside it."""
 OUTSIDE_RADIUS = 3.0
-"""The largest radius when outputs are added outside of their bounds, until they are matched."""
+"""Radius to which the trust region is cut where outputs are added outside of their bounds; the one
+before is restored once outputs are matched."""
 DENSITY_FLOOR = 1e-9
 """Mean density of the initial objective below which 1 is used as its scale."""
 MAX_FORCE = 1e12
@@ -155,7 +156,7 @@ class _Iteration(BoundedSteps[X]):
         self.marks = outcome.marks
         self.marked = 0.0
         self.cut = 0
-        self.radius_before = 0.0
+        self.radius_to_restore = 0.0
 
     def run(self) -> None:
         """Iterate until stationary, or until a limit is reached."""
@@ -238,7 +239,7 @@ class _Iteration(BoundedSteps[X]):
         self.product = outcome.barrier.mean_product()
         violation = outcome.violation
         if violation <= MATCHED:
-            self.radius, self.radius_before = max(self.radius, self.radius_before), 0.0
+            self.radius, self.radius_to_restore = max(self.radius, self.radius_to_restore), 0.0
         self.violations.append(violation)
         self._mark(x)
         return True
@@ -287,6 +288,7 @@ class _Iteration(BoundedSteps[X]):
         self._drop_marks(mu)
         self.product = outcome.barrier.mean_product()
         self.penalty, self.shift, self.radius = 0.0, 0.0, max(self.radius, 1.0)
+        self.radius_to_restore = 0.0
         self.stalled, self.cautious = 0, self.plain
         self.violations.clear()
 
@@ -364,7 +366,7 @@ class _Iteration(BoundedSteps[X]):
         )
         beyond = barrier.outside(outputs.y)
         if beyond[len(found.kept) :].any():
-            self.radius_before = max(self.radius, self.radius_before)
+            self.radius_to_restore = max(self.radius, self.radius_to_restore)
             self.radius = min(self.radius, OUTSIDE_RADIUS)
         if found.handed is not None:
             new, beside = found.handed

@@ -94,5 +94,7 @@ def test_the_least_distance_of_a_motion_is_that_of_all_obstacles() -> None:
     assert (found.cost, found.nit) == (alone.cost, alone.nit)
     margins = found.margins()
     assert margins.distance == pytest.approx(8.0, abs=1.0)
-    assert margins.pair.endswith("and obstacle 'far'")
+    assert margins.nearest_pair is not None
+    assert margins.nearest_pair.endswith("and obstacle 'far'")
+    assert f"of {margins.nearest_pair}" in str(margins)
     assert found.trajectory.metadata["clearance"]["obstacles"][0]["name"] == "far"

@@ -20,6 +20,7 @@ from hovi.planning.search.job import Job
 from hovi.planning.search.multistart import (
     SAME_COST,
     STARTS_PER_ROUND,
+    Exploration,
     Pool,
     default_processes,
     distinct,
@@ -366,21 +367,62 @@ def test_the_slower_way_comes_after_the_other_guess(
     answers: list[Status],
     ways: list[str],
 ) -> None:
-    known, left, asked = search(job, guesses, 1)[0], list(answers), list[str]()
+    first = FirstGuesses(guesses[0], 0.1, (guesses[1],))
+    asked, found = answered(job, first, answers, monkeypatch)
+    assert asked == ways
+    assert found.done == len(ways)
+    assert found.minima[0].success == (FOUND in answers)
+    assert len(found.by_path) == sum("path" in each for each in ways)
+
+
+@pytest.mark.parametrize(
+    ("answers", "ways"),
+    [
+        ([DIVERGED, FOUND], ["path rows", "direct rows"]),
+        ([DIVERGED] * 2 + [FOUND], ["path rows", "direct rows", "other rows"]),
+        (
+            [DIVERGED] * 4 + [FOUND],
+            ["path rows", "direct rows", "other rows", "other rows", "path points"],
+        ),
+        ([DIVERGED, LIMIT], ["path rows", "direct rows"]),
+        ([DIVERGED] * 2 + [LIMIT], ["path rows", "direct rows", "other rows"]),
+    ],
+)
+def test_other_paths_come_before_the_slower_way(
+    job: Job,
+    guesses: list,
+    monkeypatch: pytest.MonkeyPatch,
+    answers: list[Status],
+    ways: list[str],
+) -> None:
+    drawn = list[int]()
+
+    def further() -> list:
+        drawn.append(len(drawn))
+        return guesses[2:4]
+
+    first = FirstGuesses(guesses[0], 0.1, (guesses[1],), further)
+    asked, found = answered(job, first, answers, monkeypatch)
+    assert asked == ways
+    assert len(drawn) == ("other rows" in ways)  # once, and only where they are needed
+    assert len(found.by_path) == sum("direct" not in each for each in ways)
+
+
+def answered(
+    job: Job, first: FirstGuesses, answers: list[Status], monkeypatch: pytest.MonkeyPatch
+) -> tuple[list[str], Exploration]:
+    """What a single start solves, guess and way, where solves end as given; and what it finds."""
+    known, left, asked = search(job, [first.direct], 1)[0], list(answers), list[str]()
+    names = {id(first.direct): "direct", id(first.paths[0]): "path"}
 
     def solve(job: Job, free: object, guess: object, limit: object, way: object) -> Solution:
-        asked.append(f"{'path' if guess is guesses[1] else 'direct'} {way}")
+        asked.append(f"{names.get(id(guess), 'other')} {way}")
         status = left.pop(0)
         return dataclasses.replace(known, status=status, success=status is FOUND)
 
     monkeypatch.setattr(multistart, "_solve", solve)
     monkeypatch.setattr(interior_point, "takes_rows", lambda problem: True)
-    first = FirstGuesses(guesses[0], 0.1, (guesses[1],))
-    found = explore(Pool(job, 1), first, 1, 0, silent)
-    assert asked == ways
-    assert found.done == len(ways)
-    assert found.minima[0].success == (FOUND in answers)
-    assert len(found.by_path) == sum("path" in each for each in ways)
+    return asked, explore(Pool(job, 1), first, 1, 0, silent)
 
 
 def test_where_distances_have_no_rows_every_guess_has_one_solve(

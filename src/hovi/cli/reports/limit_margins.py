@@ -28,17 +28,18 @@ def least_distance(motion: Solution | Trajectory) -> float | None:
     return nearest_pair(motion)[0]
 
 
-def nearest_pair(motion: Solution | Trajectory) -> tuple[float | None, str]:
-    """The least distance, and its pair as messages name it; None and "" without obstacles."""
+def nearest_pair(motion: Solution | Trajectory) -> tuple[float | None, str | None]:
+    """The least distance, and the pair at which it occurs; None without obstacles."""
     kept = _distances_of(motion)
-    return (None, "") if kept is None else margins.nearest_pair(_trajectory_of(motion), *kept)
+    return (None, None) if kept is None else margins.nearest_pair(_trajectory_of(motion), *kept)
 
 
 @dataclass(frozen=True)
 class KnownMargins:
     """What a report shows of the margins of a motion, and whether the motion is usable.
 
-    limits, distance, segments, pair: as hovi.Margins; None, or none, without limits or obstacles.
+    limits, distance, segments, nearest_pair: as hovi.Margins; None, or none, without limits or
+        obstacles.
     violation: as Solution.violation; None if it is not known.
     missing: why the rest is not known; "" if all is.
     """
@@ -48,7 +49,7 @@ class KnownMargins:
     segments: Mapping[str, LimitMargins] = field(default_factory=dict)
     violation: str | None = None
     missing: str = ""
-    pair: str = ""
+    nearest_pair: str | None = None
 
     @classmethod
     def of(cls, solution: Solution, deadline: Deadline) -> KnownMargins:
@@ -65,7 +66,7 @@ class KnownMargins:
                 limits, segments = margins.limit_margins(motion, _limits_of(solution))
                 violation = solution.violation if solution.problem is not None else None
                 distance, pair = nearest_pair(solution)
-                return cls(limits, distance, segments, violation, pair=pair)
+                return cls(limits, distance, segments, violation, nearest_pair=pair)
         except OutOfTimeError as late:
             return cls(limits, None, segments, violation, str(late))
 

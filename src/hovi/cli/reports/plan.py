@@ -58,7 +58,7 @@ def as_json(
         "usable": None if margins.violation is None else not margins.violation,
         "violation": margins.violation or None,
         "least_distance": margins.distance,
-        "nearest_pair": margins.pair or None,
+        "nearest_pair": margins.nearest_pair,
         "out": None if out is None else str(out),
         **segments_json(solution, margins.segments),
         **accuracy_json(solution, task),
@@ -99,8 +99,8 @@ def print_report(
     if margins.distance is not None:
         kept = task.options.clearance.margin
         print(
-            f"distance {margins.distance:.4g} m at the nearest approach, of {margins.pair}; "
-            f"the margin is {kept:g} m"
+            f"distance {margins.distance:.4g} m at the nearest approach, of "
+            f"{margins.nearest_pair}; the margin is {kept:g} m"
         )
     if certificate is not None:
         _print_lines(certificate_lines(certificate, verbose))

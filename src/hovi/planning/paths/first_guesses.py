@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
 
@@ -15,17 +16,24 @@ from hovi.system.deadline import Deadline, OutOfTimeError
 
 MAX_PATHS = 8
 """Maximum number of starts from paths."""
+FURTHER = 4
+"""Number of paths that are drawn where neither the first one nor the direct guess leads to a
+motion."""
 PATH_SHARE = 0.2
 """Share of the time limit for finding paths."""
 
 
 @dataclass(frozen=True, eq=False)
 class FirstGuesses:
-    """A direct guess, how deep in obstacles it is, in [m], and guesses along paths around them."""
+    """A direct guess, how deep in obstacles it is, in [m], and guesses along paths around them.
+
+    further: draws other paths, where there are any.
+    """
 
     direct: DiscretePath
     depth: float = -np.inf
     paths: tuple[DiscretePath, ...] = ()
+    further: Callable[[], Sequence[DiscretePath]] = tuple
 
     @property
     def all(self) -> tuple[DiscretePath, ...]:
@@ -78,12 +86,20 @@ def first_guesses(
     if depth < DEEP or not has_ompl():
         return FirstGuesses(direct, depth)
     progress("looking for paths around the obstacles", 0.0)
+    draw = partial(_drawn, problem, direct, deadline)
+    paths = draw(min(max(starts - 1, 1), MAX_PATHS), seed)
+    return FirstGuesses(direct, depth, paths, partial(draw, FURTHER, seed + 1))
+
+
+def _drawn(
+    problem: TrajectoryProblem, direct: DiscretePath, deadline: Deadline, count: int, seed: int
+) -> tuple[DiscretePath, ...]:
+    """So many paths, or those that are found in their share of the time that is left."""
     paths = list[DiscretePath]()
-    count = min(max(starts - 1, 1), MAX_PATHS)
     try:
         with deadline.part(PATH_SHARE).in_force():
             for path in path_guesses(problem, direct, count, seed):
                 paths.append(path)
-    except OutOfTimeError:  # with those that there are
+    except OutOfTimeError:
         pass
-    return FirstGuesses(direct, depth, tuple(paths))
+    return tuple(paths)

@@ -173,7 +173,7 @@ class FrameCondition(Condition):
         """sum_i weights_i d2 c_i."""
         n = self.robot.nv
         curvature = np.zeros((2, n, 2, n))
-        curvature[0, :, 0] = self._curvature(q[None], weights[None])[0][0]
+        curvature[0, :, 0] = self._curvature(np.asarray(q)[None], np.asarray(weights)[None])[0][0]
         return curvature
 
     def pose_error(self, q: Array) -> tuple[float, float]:

@@ -31,7 +31,7 @@ class Condition(ABC):
 
     @abstractmethod
     def curvature(self, q: Array, v: Array, weights: Array) -> Array:
-        """sum_i weights_i d2 c_i, shape (2, nv, 2, nv)."""
+        """sum_i weights_i d2 c_i, shape (2, nv, 2, nv): a new array, which may be changed."""
 
     def is_spurious(self, q: Array, v: Array) -> bool:
         """Whether c = 0 holds at a spurious root, where the goal itself is not met."""

@@ -7,9 +7,8 @@ one the best minima found so far (basin hopping). [WalesDoye1997]
 from __future__ import annotations
 
 import dataclasses
-import itertools
 import os
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import closing
 from dataclasses import field
 from functools import partial
@@ -244,28 +243,21 @@ def explore(
 
 
 def _from_path_or_direct(pool: Pool, first: FirstGuesses, progress: Progress) -> Exploration:
-    """A single start: the first path, and the direct guess if no solution is found from it.
+    """A single start: the first path, and other guesses while no solution is found.
 
-    If both fail with rows of distances, both are tried again with distances at quadrature points,
-    since that takes longer than the other guess with rows; not if one left a motion, as at its
-    iteration limit, from where more steps are closer to a minimum.
+    A motion that is left, as at an iteration limit, ends the search among rows of distances: from
+    there more steps are closer to a minimum than another guess is.
     """
     from hovi.planning.solver.methods.interior_point import WITHOUT_MOTION, takes_rows  # 10 ms
 
-    ways: tuple[DistancesAt | None, ...] = (None,)
-    if pool.free is None and takes_rows(pool.job.problem()):
-        ways = "rows", "points"
-    guesses = first.paths[0], first.direct
-    tried, stopped = list[tuple[int, Solution]](), False
+    rows = pool.free is None and takes_rows(pool.job.problem())
+    tried, by_path, stopped = list[Solution](), list[Trajectory](), False
     closer = False  # whether a motion is worth more steps
-    for way, i in itertools.product(ways, (0, 1)):
-        if closer and way == "points":
-            break
+    for attempt in _attempts(first, rows):
         if tried:
-            at_points = ", distances at quadrature points" if way == "points" else ""
-            progress(("from the path", "from the direct guess")[i] + at_points, 0.5)
+            progress(attempt.text, 0.5)
         try:
-            found = pool.solve_all([guesses[i]], way)  # a single one in this process
+            found = pool.solve_all([attempt.guess], attempt.way)  # a single one in this process
         except KeyboardInterrupt:
             if not tried:
                 raise
@@ -273,13 +265,44 @@ def _from_path_or_direct(pool: Pool, first: FirstGuesses, progress: Progress) ->
             stopped = True
             break
         solution, stopped = found.solutions[0], found.interrupted
-        tried.append((i, solution))
-        if solution.success or stopped or pool.deadline.passed:
+        tried.append(solution)
+        by_path += [solution.trajectory] * attempt.by_path
+        closer = closer or (attempt.way == "rows" and solution.status not in WITHOUT_MOTION)
+        ended = solution.success or stopped or pool.deadline.passed
+        if ended or (closer and len(tried) > 1):  # the direct guess is tried in any case
             break
-        closer = closer or (way == "rows" and solution.status not in WITHOUT_MOTION)
-    minima = distinct([each for _, each in tried])
-    by_path = tuple(each.trajectory for i, each in tried if i == 0)
-    return Exploration(minima, len(tried), stopped, (), first, by_path)
+    return Exploration(distinct(tried), len(tried), stopped, (), first, tuple(by_path))
+
+
+@dataclass(frozen=True, eq=False)
+class _Attempt:
+    """A solve from a guess.
+
+    by_path: whether it is a path by OMPL. way: where distances are bounded. text: for the progress.
+    """
+
+    guess: DiscretePath
+    by_path: bool
+    way: DistancesAt | None
+    text: str
+
+
+def _attempts(first: FirstGuesses, rows: bool) -> Iterator[_Attempt]:
+    """The first path, and the direct guess; with rows of distances, further paths after these.
+
+    The last two attempts have distances at quadrature points instead, which takes far longer.
+    """
+    path, direct = first.paths[0], first.direct
+    way: DistancesAt | None = "rows" if rows else None
+    yield _Attempt(path, True, way, "from a path")
+    yield _Attempt(direct, False, way, "from the direct guess")
+    if not rows:
+        return
+    for further in first.further():
+        yield _Attempt(further, True, way, "from another path")
+    at_points = ", distances at quadrature points"
+    yield _Attempt(path, True, "points", f"from the path{at_points}")
+    yield _Attempt(direct, False, "points", f"from the direct guess{at_points}")
 
 
 def _round(

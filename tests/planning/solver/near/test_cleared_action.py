@@ -105,6 +105,23 @@ def test_rows_that_are_watched_refuse_a_step_into_a_pair_before_there_are_any() 
     assert len(found.origin) == none.size > 0
 
 
+def test_outputs_after_a_refinement_are_those_of_a_new_action() -> None:
+    """At paths that were measured before it, too."""
+    problem = problem_of("ur5")
+    path = wavy(problem)
+    action = action_of(problem, path, 0.1)
+    assert action.rows is not None
+    size = action.rows.size
+    action.outputs(path)
+    assert action.refine(path, 1e-6) is not None
+    assert action.rows.size > size
+    near = action.near.copied()
+    fresh = ClearedAction(problem, action.limits, None, None, None, action.rows, near)
+    for x in (path, wavy(problem)):
+        np.testing.assert_allclose(action.outputs(x).y, fresh.outputs(x).y, atol=1e-12)
+        assert action.outputs(x).value == fresh.outputs(x).value
+
+
 def test_rows_of_parts_are_taken_with_their_intervals_and_values() -> None:
     problem = problem_of("ur5")
     path = wavy(problem)

@@ -31,6 +31,8 @@ DistancesAt = Literal["rows", "points"]
 
 WITHOUT_MOTION = Status.INFEASIBLE, Status.DIVERGED, Status.SADDLE
 """Results of a solve with rows of distances after which one at quadrature points may help."""
+STEPS_AT_POINTS = 200
+"""Maximum number of steps of each solve then: those that help take fewer."""
 
 
 def takes_rows(problem: TrajectoryProblem) -> bool:
@@ -86,14 +88,18 @@ class InteriorPoint(Method):
     ) -> MethodResult:
         """With rows for distances where pairs come near; in rounds where that is not supported."""
         rounds = partial(with_active_pairs, partial(self._minimize, report=report), report=report)
-        if self.distances == "points" or not takes_rows(problem):
+        if not takes_rows(problem):
             return rounds(problem, path, options)
+        most = min(STEPS_AT_POINTS, options.max_iterations)
+        at_points = dataclasses.replace(options, max_iterations=most)
+        if self.distances == "points":
+            return rounds(problem, path, at_points)
         deadline = Deadline(options.time_limit)
         found = self._minimize(problem, path, options, report, lazy=True)
         if self.distances == "rows" or found.status not in WITHOUT_MOTION:
             return found
-        options = dataclasses.replace(options, time_limit=deadline.seconds_left)
-        again = rounds(problem, path, options)
+        at_points = dataclasses.replace(at_points, time_limit=deadline.seconds_left)
+        again = rounds(problem, path, at_points)
         history = [*found.history, *again.history]
         return dataclasses.replace(again, nit=found.nit + again.nit, history=history)
 

@@ -74,9 +74,11 @@ class Approaches:
 
 def configurations(problem: TrajectoryProblem, path: DiscretePath, batch: InstantBatch) -> Array:
     """q at instants, (M, nq), on vector spaces and commutative groups."""
-    q, x = path.q[batch.numbers], batch.changes(path)
-    on = problem.coordinates
-    return q + x if on.vector_joints else np.asarray(on.integrate(q, x))
+    q, x = path.q[batch.numbers], batch.displacements(path)
+    coordinates = problem.coordinates
+    if coordinates.vector_joints:  # several times in every step, so without checks of shapes
+        return q + x
+    return np.asarray(coordinates.integrate(q, x))
 
 
 def spread(problem: TrajectoryProblem, number: int) -> InstantBatch:

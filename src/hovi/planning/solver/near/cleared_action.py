@@ -58,7 +58,7 @@ class ClearedAction(BoundedAction):
     ) -> None:
         self.near = near
         near.stand_behind(rows)
-        self._limited = RecentPaths[Array]()
+        self._limit_outputs = RecentPaths[Array]()
         super().__init__(problem, limits, margins, algebra, multipliers, None, rows)
         self._near: ExpandedRows | None = None
         self._force = np.zeros(0)
@@ -89,10 +89,10 @@ class ClearedAction(BoundedAction):
 
     def _bounded_outputs(self, x: DiscretePath, outputs: list[Array]) -> Array:
         """Those without distances, which are kept for the last paths."""
-        known = self._limited.get(x)
+        known = self._limit_outputs.get(x)
         if known is None:
             known = super()._bounded_outputs(x, outputs)
-            self._limited = self._limited.with_entry(x, known)
+            self._limit_outputs = self._limit_outputs.with_entry(x, known)
         return known
 
     def model(
@@ -163,6 +163,8 @@ class ClearedAction(BoundedAction):
         assert self.rows is not None
         order, before = self.near.order, self.rows.size
         found = self.rows.refine(x, level)
+        if found is not None:  # before anything that may run out of time
+            self._limit_outputs = RecentPaths()
         sharper = self.near.sharpen(x)
         added = self.near.extend(self.problem, x, AHEAD * level * DISTANCE_SCALE)
         self.blocked = self.near.blocked
@@ -170,7 +172,6 @@ class ClearedAction(BoundedAction):
             return None
         kept, origin = np.arange(before), np.zeros(0, dtype=np.intp)
         if found is not None:
-            self._limited = RecentPaths()
             kept, origin = found.kept, found.origin
         return self._renumbered(order, before, kept, origin, added)
 

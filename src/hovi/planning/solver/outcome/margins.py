@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping
 from dataclasses import field
 
@@ -93,20 +94,20 @@ class Margins:
     distance: the least distance to obstacles and, with self-collision, between links, in [m]; None
         for a plan without either.
     segments: of a sequence, the margins to the limits of each segment, by its name.
-    pair: which come nearest, as messages name it; "" for a plan without obstacles.
+    nearest_pair: the link and the obstacle, or the two links, at that distance; None without one.
     """
 
     limits: LimitMargins | None = None
     distance: float | None = None
     segments: Mapping[str, LimitMargins] = field(default_factory=dict)
-    pair: str = ""
+    nearest_pair: str | None = None
 
     def __str__(self) -> str:
         """The tightest limit of the motion and of each segment, and the least distance."""
         known = ["no limits" if self.limits is None else str(self.limits)]
         known += [f"{name!r}: {each}" for name, each in self.segments.items()]
         if self.distance is not None:
-            known.append(f"least distance {self.distance:.4g} m, of {self.pair}")
+            known.append(f"least distance {self.distance:.4g} m, of {self.nearest_pair}")
         return "\n".join(known)
 
 
@@ -162,8 +163,8 @@ def least_distance(motion: Trajectory, clearance: Clearance, distances: Distance
 def nearest_pair(
     motion: Trajectory, clearance: Clearance, distances: Distances
 ) -> tuple[float, str]:
-    """The least distance, as `least_distance`, and the pair, as messages name it."""
+    """The least distance, as `least_distance`, and the pair at which it occurs, in words."""
     approach = approach_along(motion, distances, clearance.margin)
     closest = (approach.distance - distances.allowance).min(axis=0)
     pair = int(np.argmin(closest))
-    return float(closest[pair]), str(distances.pairs[pair])
+    return float(closest[pair]), str(dataclasses.replace(distances.pairs[pair], touching=False))
