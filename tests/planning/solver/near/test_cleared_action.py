@@ -109,11 +109,11 @@ def test_outputs_after_a_refinement_are_those_of_a_new_action() -> None:
     """At paths that were measured before it, too."""
     problem = problem_of("ur5")
     path = wavy(problem)
-    action = action_of(problem, path, 0.1)
+    action = action_of(problem, path, 0.0)
     assert action.rows is not None
     size = action.rows.size
     action.outputs(path)
-    assert action.refine(path, 1.0) is not None
+    assert action.refine(path, 0.5) is not None
     assert action.rows.size > size
     near = action.near.copied()
     fresh = ClearedAction(problem, action.limits, None, None, None, action.rows.copied(), near)
