@@ -113,7 +113,7 @@ def test_outputs_after_a_refinement_are_those_of_a_new_action() -> None:
     assert action.rows is not None
     size = action.rows.size
     action.outputs(path)
-    assert action.refine(path, 0.5) is not None
+    assert action.refine(path, 1e-3) is not None
     assert action.rows.size > size
     near = action.near.copied()
     fresh = ClearedAction(problem, action.limits, None, None, None, action.rows.copied(), near)
