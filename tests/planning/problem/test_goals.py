@@ -293,3 +293,12 @@ def test_one_unreachable_via_point_of_two_is_enough(far: int) -> None:
     assert solution.status is hovi.Status.INFEASIBLE
     assert solution.nit == 0
     assert f"the via point at {0.5 if far == 0 else 1:g} s" in solution.message
+
+
+def test_a_via_point_at_a_frame_that_the_robot_does_not_have_is_refused() -> None:
+    scene = hovi.Scene(hovi.load_robot("ur5"), [hovi.effects.Gravity()])
+    via = [hovi.Via(0.8, hovi.FrameGoal("tol0", position=[0.5, 0.1, 0.5]))]
+    with pytest.raises(InputError, match="has no frame 'tol0': did you mean 'tool0'"):
+        hovi.plan(
+            scene, [0.0, -1.4, 1.6, -0.2, 0.5, 0.0], [1.0, -1.0, 1.2, -0.2, 0.9, 0.3], 1.5, via=via
+        )

@@ -95,6 +95,7 @@ def goal_state(
         raise InputError(f"the {name} must be a State or a FrameGoal, got {type(goal).__name__}.")
     if not isinstance(coordinates, Robot):
         raise InputError(f"the {name} must be a State: {coordinates.owner} has no frames.")
+    goal.check(coordinates)
     reached = _solved_inverse_kinematics(coordinates, goal, near.tobytes(), limits)
     moving = _moving_joints(coordinates, goal.frame, tuple(free))
     state = State(reached.q, free=moving, free_velocity=tuple(goal.free_velocity))
