@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import hovi
-from hovi.cli.reports.limit_margins import KnownMargins, least_distance, limit_margins
+from hovi.cli.reports.limit_margins import KnownMargins, limit_margins, nearest_pair
 from hovi.planning.clearance.obstacles import Sphere
 from hovi.planning.solver.solver import Solution
 from hovi.system.deadline import Deadline
@@ -48,10 +48,10 @@ def test_the_margins_of_a_solution_come_from_its_problem(limited: Solution) -> N
 
 
 def test_the_distance_of_a_solution_comes_from_its_problem(limited: Solution) -> None:
-    distance = least_distance(limited.trajectory)
+    distance = nearest_pair(limited.trajectory)[0]
     assert distance is not None
-    assert least_distance(without_metadata(limited)) == distance
-    assert least_distance(without_metadata(limited).trajectory) is None
+    assert nearest_pair(without_metadata(limited))[0] == distance
+    assert nearest_pair(without_metadata(limited).trajectory)[0] is None
 
 
 def test_the_pair_that_comes_nearest_is_named(arm_scene: hovi.Scene) -> None:
@@ -71,7 +71,7 @@ def test_the_margins_of_a_solution_without_a_problem_come_from_its_metadata(
     assert recorded is not None
     assert from_problem is not None
     np.testing.assert_array_equal(from_problem.margin, recorded.margin)
-    assert least_distance(alone) == least_distance(limited)
+    assert nearest_pair(alone)[0] == nearest_pair(limited)[0]
 
 
 def test_the_margins_of_a_file_come_from_its_metadata(limited: Solution, tmp_path: Path) -> None:
@@ -97,13 +97,13 @@ def test_inactive_limits_of_a_plan_to_a_tolerance_are_reported(arm_scene: hovi.S
 def test_a_motion_without_limits_and_obstacles_has_no_margins(arm_scene: hovi.Scene) -> None:
     solution = planned(arm_scene, limits="none")
     assert limit_margins(solution) is None
-    assert least_distance(solution) is None
+    assert nearest_pair(solution)[0] is None
 
 
 def test_margins_that_no_time_is_left_for_are_missing(limited: Solution) -> None:
     known = KnownMargins.of(limited, Deadline())
     assert known.missing == ""
     assert known.limits is not None
-    assert known.distance == least_distance(limited)
+    assert known.distance == nearest_pair(limited)[0]
     late = KnownMargins.of(limited, Deadline(-1.0))
     assert late == KnownMargins(missing="the time limit was reached")

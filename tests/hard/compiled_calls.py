@@ -207,12 +207,10 @@ def _interval_numbers_fit(arguments: Arguments, sizes: Sizes) -> bool:
 
 
 def _columns(arguments: Arguments, sizes: Sizes) -> None:
-    columns = 3 + sizes["r"]
-    arguments["table"] = np.resize(arguments["table"], (sizes["Q"], 3, columns))
-
-
-def _row_columns(arguments: Arguments, sizes: Sizes) -> None:
-    arguments["rows"] = np.resize(arguments["rows"], (sizes["E"], 3 + sizes["r"]))
+    """As many columns as a path with r inner modes has, in a table or in rows."""
+    name = "table" if "table" in arguments else "rows"
+    array = arguments[name]
+    arguments[name] = np.resize(array, (*array.shape[:-1], 3 + sizes["r"]))
 
 
 _TABLES = {"table": _in("T R m"), "weights": _in("T"), "steps": _in("B")}
@@ -715,7 +713,7 @@ ENTRIES: dict[str, Entry] = {
             **{**_PATH, "out": _out("E n")},
         },
         letters={"N": (1, 4), "c": (3, 3)},
-        values=_row_columns,
+        values=_columns,
         fits=_interval_numbers_fit,
     ),
     "intervals.misfit": Entry(

@@ -12,7 +12,7 @@ import pytest
 import umsgpack
 
 import hovi
-from hovi.cli.reports.limit_margins import least_distance
+from hovi.cli.reports.limit_margins import nearest_pair
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError
 from hovi.planning.clearance.clearance import Clearance
@@ -112,8 +112,8 @@ def test_the_least_distance_is_between_the_tip_and_the_ball(
     q = motion.configurations(np.linspace(0.0, 1.5, 50_001))
     tip = arm_scene.robot.frame_position("tip", q)
     nearest = np.linalg.norm(tip - np.asarray(BALL.position), axis=1).min() - 0.15 - 0.06
-    assert least_distance(motion) == pytest.approx(nearest, abs=1e-6)
-    assert least_distance(dataclasses.replace(motion, metadata={})) is None
+    assert nearest_pair(motion)[0] == pytest.approx(nearest, abs=1e-6)
+    assert nearest_pair(dataclasses.replace(motion, metadata={}))[0] is None
 
 
 def test_distances_get_a_panel_of_their_own(motion: Trajectory) -> None:

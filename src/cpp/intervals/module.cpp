@@ -209,7 +209,8 @@ void interpolate(const Input<3>& table, const Input<1>& steps, const Index& inte
 }
 
 void displacements_at(const Input<2>& rows, const Input<1>& steps, const Index& intervals,
-                const Input<2>& v, const Input<3>& z, const Input<3>& inner, const Output<2>& out) {
+                      const Input<2>& v, const Input<3>& z, const Input<3>& inner,
+                      const Output<2>& out) {
   const IntervalPath path = path_of(v, z, inner);
   rows.require_kind("rows");
   const std::size_t count = rows.shape(0), columns = rows.shape(1);
@@ -219,8 +220,8 @@ void displacements_at(const Input<2>& rows, const Input<1>& steps, const Index& 
   out.require("out", {count, path.dof});
   require_intervals(intervals, path);
   const nb::gil_scoped_release released;
-  hovi::intervals::displacements_at(path, rows.data(), columns, steps.data(), intervals.data(), count,
-                              out.data());
+  hovi::intervals::displacements_at(path, rows.data(), columns, steps.data(), intervals.data(),
+                                    count, out.data());
 }
 
 double misfit(const Input<1>& steps, const Input<2>& q, const Input<2>& v, const Input<3>& z,
@@ -306,8 +307,8 @@ NB_MODULE(intervals, m) {
   m.def("add_squares", &add_squares, "intervals"_a, "joints"_a, "rows"_a, "weights"_a, "sums"_a);
   m.def("interpolate", &interpolate, "table"_a, "steps"_a, "intervals"_a, "q"_a, "v"_a, "z"_a,
         "inner"_a, "out"_a);
-  m.def("displacements_at", &displacements_at, "rows"_a, "steps"_a, "intervals"_a, "v"_a, "z"_a, "inner"_a,
-        "out"_a);
+  m.def("displacements_at", &displacements_at, "rows"_a, "steps"_a, "intervals"_a, "v"_a, "z"_a,
+        "inner"_a, "out"_a);
   m.def("misfit", &misfit, "steps"_a, "q"_a, "v"_a, "z"_a, "inner"_a);
   m.def("move", &move, "step"_a, "steps"_a, "nodal"_a, "v"_a, "z"_a, "inner"_a, "dq"_a, "new_v"_a,
         "new_z"_a, "new_inner"_a);

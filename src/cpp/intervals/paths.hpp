@@ -48,8 +48,8 @@ inline void interpolate(const IntervalPath& path, const double* q, const double*
 // x of q = q0 (+) x at instants, (count, n), one row per instant, (count, columns), over
 // (h v0, h^2 z0, h^2 z1, h^2 inner) of its interval. steps: h of all intervals.
 inline void displacements_at(const IntervalPath& path, const double* rows, std::size_t columns,
-                       const double* steps, const std::int64_t* numbers, std::size_t count,
-                       double* out) {
+                             const double* steps, const std::int64_t* numbers, std::size_t count,
+                             double* out) {
   const std::size_t n = path.dof;
   for (std::size_t e = 0; e < count; ++e, rows += columns, out += n) {
     const std::size_t k = numbers[e];

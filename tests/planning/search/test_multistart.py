@@ -347,65 +347,51 @@ DIVERGED, LIMIT, FOUND = Status.DIVERGED, Status.ITERATION_LIMIT, Status.MINIMUM
 
 
 @pytest.mark.parametrize(
-    ("answers", "ways"),
+    ("others", "answers", "ways"),
     [
-        ([FOUND], ["path rows"]),
-        ([DIVERGED, FOUND], ["path rows", "direct rows"]),
-        ([DIVERGED, DIVERGED, FOUND], ["path rows", "direct rows", "path points"]),
-        ([DIVERGED, LIMIT], ["path rows", "direct rows"]),
+        (0, [FOUND], ["path rows"]),
+        (0, [DIVERGED, FOUND], ["path rows", "direct rows"]),
+        (0, [DIVERGED, DIVERGED, FOUND], ["path rows", "direct rows", "path points"]),
+        (0, [DIVERGED, LIMIT], ["path rows", "direct rows"]),
         (
+            0,
             [DIVERGED, DIVERGED, LIMIT, FOUND],
             ["path rows", "direct rows", "path points", "direct points"],
         ),
-        ([LIMIT, LIMIT], ["path rows", "direct rows"]),
-    ],
-)
-def test_the_slower_way_comes_after_the_other_guess(
-    job: Job,
-    guesses: list,
-    monkeypatch: pytest.MonkeyPatch,
-    answers: list[Status],
-    ways: list[str],
-) -> None:
-    first = FirstGuesses(guesses[0], 0.1, (guesses[1],))
-    asked, found = answered(job, first, answers, monkeypatch)
-    assert asked == ways
-    assert found.done == len(ways)
-    assert found.minima[0].success == (FOUND in answers)
-    assert len(found.by_path) == sum("path" in each for each in ways)
-
-
-@pytest.mark.parametrize(
-    ("answers", "ways"),
-    [
-        ([DIVERGED, FOUND], ["path rows", "direct rows"]),
-        ([DIVERGED] * 2 + [FOUND], ["path rows", "direct rows", "other rows"]),
+        (0, [LIMIT, LIMIT], ["path rows", "direct rows"]),
+        (2, [DIVERGED, FOUND], ["path rows", "direct rows"]),
+        (2, [DIVERGED] * 2 + [FOUND], ["path rows", "direct rows", "other rows"]),
         (
+            2,
             [DIVERGED] * 4 + [FOUND],
             ["path rows", "direct rows", "other rows", "other rows", "path points"],
         ),
-        ([DIVERGED, LIMIT], ["path rows", "direct rows"]),
-        ([DIVERGED] * 2 + [LIMIT], ["path rows", "direct rows", "other rows"]),
+        (2, [DIVERGED, LIMIT], ["path rows", "direct rows"]),
+        (2, [DIVERGED] * 2 + [LIMIT], ["path rows", "direct rows", "other rows"]),
     ],
 )
-def test_other_paths_come_before_the_slower_way(
+def test_the_slower_way_comes_after_the_other_guesses(
     job: Job,
     guesses: list,
     monkeypatch: pytest.MonkeyPatch,
+    others: int,
     answers: list[Status],
     ways: list[str],
 ) -> None:
+    """others: number of further paths, which are drawn once, and only where they are needed."""
     drawn = list[int]()
 
     def further() -> list:
-        drawn.append(len(drawn))
-        return guesses[2:4]
+        drawn.append(others)
+        return guesses[2 : 2 + others]
 
     first = FirstGuesses(guesses[0], 0.1, (guesses[1],), further)
     asked, found = answered(job, first, answers, monkeypatch)
     assert asked == ways
-    assert len(drawn) == ("other rows" in ways)  # once, and only where they are needed
+    assert found.done == len(ways)
+    assert found.minima[0].success == (FOUND in answers)
     assert len(found.by_path) == sum("direct" not in each for each in ways)
+    assert len(drawn) == (len(ways) > 2)
 
 
 def answered(

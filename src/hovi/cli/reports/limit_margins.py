@@ -23,13 +23,8 @@ def limit_margins(motion: Solution | Trajectory) -> LimitMargins | None:
     return margins.limit_margins(_trajectory_of(motion), _limits_of(motion))[0]
 
 
-def least_distance(motion: Solution | Trajectory) -> float | None:
-    """The least distance of any pair, in [m]; None for a plan without obstacles."""
-    return nearest_pair(motion)[0]
-
-
 def nearest_pair(motion: Solution | Trajectory) -> tuple[float | None, str | None]:
-    """The least distance, and the pair at which it occurs; None without obstacles."""
+    """The least distance of any pair, in [m], and that pair; None for a plan without obstacles."""
     kept = _distances_of(motion)
     return (None, None) if kept is None else margins.nearest_pair(_trajectory_of(motion), *kept)
 

@@ -95,7 +95,7 @@ def goal_state(
         raise InputError(f"the {name} must be a State or a FrameGoal, got {type(goal).__name__}.")
     if not isinstance(coordinates, Robot):
         raise InputError(f"the {name} must be a State: {coordinates.owner} has no frames.")
-    goal.check(coordinates)
+    condition = _condition(coordinates, goal)  # which checks the frame
     reached = _solved_inverse_kinematics(coordinates, goal, near.tobytes(), limits)
     moving = _moving_joints(coordinates, goal.frame, tuple(free))
     state = State(reached.q, free=moving, free_velocity=tuple(goal.free_velocity))
@@ -104,7 +104,7 @@ def goal_state(
         f"no configuration that reaches the {name} was found: at the nearest, {reached.reason}; "
         f"{hint_on_frame(coordinates, goal) or advice}"
     )
-    return GoalState(state, (_condition(coordinates, goal),), reason)
+    return GoalState(state, (condition,), reason)
 
 
 def _moving_joints(robot: Robot, frame: str, free: tuple[str, ...]) -> tuple[str, ...]:
