@@ -42,6 +42,10 @@ class Outputs:
     value: float
     y: Array
 
+    def density(self, measure: float) -> float:
+        """The mean density of the objective, an integral over a measure; positive."""
+        return max(abs(self.value), 1e-12) / measure
+
 
 class Refinement(NamedTuple):
     """Outputs that took the place of others.

@@ -17,6 +17,11 @@ from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.problem.tolerance import Quantity, Tolerance
 from hovi.planning.refinement.adaptive import refine_to_tolerance
 from hovi.planning.refinement.candidate import BARRIER_EXCESS, Candidate, error_of_cost
+from hovi.planning.refinement.error_estimate import (
+    LIMITED_SAFETY_FACTOR,
+    FinerSolution,
+    finer_than,
+)
 from hovi.planning.solver.solver import Solution, solve_on_grid
 from hovi.scene.scene import Scene
 from hovi.schemes import by_name
@@ -59,6 +64,60 @@ def test_under_limits_estimates_are_not_below_the_true_errors(
     assert min(ratios) > 0.8
     assert np.mean(np.array(ratios) > 1.0) > 0.8
     assert max(ratios) < 4.0
+
+
+def test_estimates_with_known_decay_are_not_below_the_true_errors(
+    arm_scene: Scene, limited_reference: Solution
+) -> None:
+    """A finer motion is compared with a still finer one, which is nearer to it than it was."""
+    tolerance, ratios, factors = Tolerance(1e-3, Quantity.COST), [], []
+    for intervals in (6, 8, 10, 12, 16):
+        problem = reach(arm_scene, "galerkin-2x8", intervals, limits=FAST)
+        coarse = solve_on_grid(problem, limited_reference.trajectory)
+        finer = finer_than(coarse)
+        assert finer is not None
+        found = finer.finish()
+        assert found is not None
+        before = finer.decrease_to(found)
+        known = Candidate.of(found, tolerance, before=before)
+        assert known.finer is not None
+        factors.append(known.finer.safety_factor)
+        assert known.error <= Candidate.of(found, tolerance).error
+        true = abs(found.cost / limited_reference.cost - 1.0)
+        ratios.append(known.error / true)
+    assert min(factors) < LIMITED_SAFETY_FACTOR
+    assert min(ratios) > 0.8
+    assert max(ratios) < 4.0
+
+
+@pytest.mark.parametrize(
+    ("before", "factor"),
+    [(None, 3.0), (5.0, 2.25), (1.6, 2.0 / 0.75), (1.2, 3.0), (0.9, 3.0), (-4.0, 3.0)],
+)
+def test_the_safety_factor_is_that_of_a_geometric_decay(
+    before: float | None, factor: float, limited_reference: Solution
+) -> None:
+    problem, path = limited_reference.problem, limited_reference.trajectory.path
+    assert problem is not None
+    gains = np.zeros(problem.grid.intervals)
+    finer = FinerSolution(problem, path, 99.0, 100.0, gains, lambda: None, before=before)
+    assert finer.safety_factor == pytest.approx(factor, rel=1e-12)
+
+
+def test_a_motion_is_the_finer_one_if_it_costs_as_much(limited_reference: Solution) -> None:
+    found, problem = limited_reference, limited_reference.problem
+    assert problem is not None
+    gains, path = np.zeros(problem.grid.intervals), found.trajectory.path
+
+    def decrease(before: float, after: float) -> float | None:
+        known, cost = before * found.cost, after * found.cost
+        return FinerSolution(problem, path, cost, known, gains, lambda: None).decrease_to(found)
+
+    assert decrease(1.001, 1.0) == pytest.approx(1e-3 * found.cost)
+    assert decrease(1.001, 1.0 - 5e-5) == pytest.approx(1.05e-3 * found.cost)
+    assert decrease(1.001, 1.0 - 2e-4) is None
+    assert decrease(1.001, 1.0 + 2e-4) is None
+    assert decrease(0.999, 1.0) is None
 
 
 def test_an_error_within_limits_contains_what_a_barrier_costs(

@@ -179,11 +179,12 @@ class _Search:
         self.best = candidate
         return ""
 
-    def _evaluated(self, solution: Solution) -> Candidate:
-        """A solution with its estimated error, recorded as a round."""
+    def _evaluated(self, solution: Solution, before: float | None = None) -> Candidate:
+        """A solution with its estimated error, recorded as a round. before: see FinerSolution."""
         raise_if_interrupted()
         began = time.perf_counter()
-        candidate = Candidate.of(solution, self.tolerance, self.deadline.seconds_left)
+        left = self.deadline.seconds_left
+        candidate = Candidate.of(solution, self.tolerance, left, before)
         grid = solution.trajectory.grid
         points = sum(len(scheme.points) * len(index) for scheme, index in grid.groups)
         seconds = solution.solve_seconds + time.perf_counter() - began
@@ -224,7 +225,7 @@ class _Search:
         """The solution on the next grid, which may be that of the finer solution."""
         problem, finer = candidate.solution.problem, candidate.finer
         assert problem is not None
-        grid = next_grid(candidate)
+        grid, before = next_grid(candidate), None
         if finer is None:
             fine, known = problem.on(grid), candidate.solution
             along = _along(known.central, problem, fine)
@@ -232,13 +233,14 @@ class _Search:
         if grid is finer.problem.grid:
             solution = finer.finish()
             fine = finer.problem
+            before = None if solution is None else finer.decrease_to(solution)
         else:
             fine = problem.on(grid)
             solution = _solved_nearby(finer, fine)
         if solution is None:
             along = _along(finer.central, finer.problem, fine)
             solution = self._solved(fine, interpolated_to(finer, fine), candidate, along)
-        return self._evaluated(solution)
+        return self._evaluated(solution, before)
 
     def _solved(
         self,

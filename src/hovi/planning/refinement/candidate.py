@@ -14,7 +14,6 @@ from hovi.discrete.measures.motion_error import relative_difference
 from hovi.errors import InputError
 from hovi.planning.problem.tolerance import CURVE_TOLERANCE, Quantity, Tolerance
 from hovi.planning.refinement.error_estimate import (
-    LIMITED_SAFETY_FACTOR,
     FinerSolution,
     estimate_against,
     finer_than,
@@ -79,11 +78,21 @@ class Candidate:
     later: float = 0.0
 
     @classmethod
-    def of(cls, solution: Solution, tolerance: Tolerance, time_limit: float | None = None) -> Self:
-        """A solution with the estimate of its error. time_limit: of the finer solution, in [s]."""
+    def of(
+        cls,
+        solution: Solution,
+        tolerance: Tolerance,
+        time_limit: float | None = None,
+        before: float | None = None,
+    ) -> Self:
+        """A solution with the estimate of its error.
+
+        time_limit: of the finer solution, in [s]. before: see FinerSolution.
+        """
         finer = finer_than(solution, time_limit) if solution.success else None
         if finer is None:
             return cls(solution, tolerance)
+        finer = dataclasses.replace(finer, before=before)
         assert solution.problem is not None
         along = error_along(solution, finer)
         passive = passive_torque(solution.problem, solution.trajectory)
@@ -242,7 +251,7 @@ def error_of_cost(solution: Solution, finer: FinerSolution) -> float:
     problem = solution.problem
     assert problem is not None
     if problem.limited:
-        error = LIMITED_SAFETY_FACTOR * error + _excess_of_bounds(solution)
+        error = finer.safety_factor * error + _excess_of_bounds(solution)
     elif error > CURVE_TOLERANCE:
         error *= LOOSE_SAFETY_FACTOR
     return max(error + cost_of_tolerance(solution), ROUNDING_FLOOR)

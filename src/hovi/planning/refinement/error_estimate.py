@@ -39,6 +39,11 @@ Array = npt.NDArray[np.float64]
 
 LIMITED_SAFETY_FACTOR = 3.0
 """Factor on estimates under limits, where the finer solution is not much better."""
+LEAST_SAFETY_FACTOR = 2.25
+"""The least such factor for costs, where their decay is known: see FinerSolution.safety_factor."""
+SAME_COST = 0.1
+"""Change of the cost of a finer solution up to which it is the same once it is finished, relative
+to its difference from the coarser one."""
 RICHER_LEVEL = 3e-4
 """Barrier parameter at which a solve with more modes begins within limits."""
 RICHER_BARRIER = 1e-7
@@ -69,12 +74,13 @@ def estimate_against(
 ) -> MotionError:
     """The error of a solution relative to a given finer one; frame as above.
 
-    Within limits times LIMITED_SAFETY_FACTOR; that of the cost is at least the solution's
-    error_estimate.
+    Within limits times LIMITED_SAFETY_FACTOR, or that of the cost times the finer solution's
+    safety_factor; that of the cost is at least the solution's error_estimate.
     """
     error = deviation(solution.trajectory, finer.trajectory, (finer.known, finer.cost), frame)
     if finer.problem.limited:
-        error = error.scaled(LIMITED_SAFETY_FACTOR)
+        cost = finer.safety_factor * error.cost
+        error = dataclasses.replace(error.scaled(LIMITED_SAFETY_FACTOR), cost=cost)
     known = solution.error_estimate
     return error if known is None else dataclasses.replace(error, cost=max(error.cost, known))
 
@@ -117,6 +123,8 @@ class FinerSolution:
         Their sum is the difference of costs to first order.
     finish: returns the converged finer solution; None if that fails.
     central: of the finer solution within limits, which that of another motion may follow.
+    before: the difference of costs at which the coarser solution was itself the finer one, of as
+        many intervals with fewer modes; None if it was not.
     """
 
     problem: TrajectoryProblem
@@ -126,6 +134,24 @@ class FinerSolution:
     gains: Array
     finish: Callable[[], Solution | None]
     central: CentralPath | None = None
+    before: float | None = None
+
+    @property
+    def safety_factor(self) -> float:
+        """Factor on the difference of costs within limits, at most LIMITED_SAFETY_FACTOR.
+
+        1 / (1 - rho) if differences go on to decay by rho as the last two do, but at least
+        LEAST_SAFETY_FACTOR.
+        """
+        rho = 1.0 if self.before is None else (self.known - self.cost) / self.before
+        factor = 1.0 / (1.0 - rho) if 0.0 <= rho < 1.0 else LIMITED_SAFETY_FACTOR
+        return float(np.clip(factor, LEAST_SAFETY_FACTOR, LIMITED_SAFETY_FACTOR))
+
+    def decrease_to(self, finished: Solution) -> float | None:
+        """What its cost is less than that of the coarser one; None if that is not of `finished`."""
+        gain = self.known - self.cost
+        same = abs(finished.cost - self.cost) <= SAME_COST * gain
+        return gain if gain > 0.0 and same else None
 
     @property
     def trajectory(self) -> Trajectory:

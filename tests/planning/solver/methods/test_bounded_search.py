@@ -18,7 +18,7 @@ from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.limits import as_limits
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.bounded_action import BoundedAction
-from hovi.planning.solver.methods.bounded_search import BoundedSearch, mean_density
+from hovi.planning.solver.methods.bounded_search import BoundedSearch
 from hovi.planning.solver.solver import guess_path, solve_on_grid
 from hovi.planning.solver.status import Status
 from hovi.robot.loading import load_robot
@@ -40,7 +40,7 @@ def test_a_barrier_begins_at_the_mean_of_the_cost_over_time_whatever_its_sign(
     for sign in (1, -1):
         signed = dataclasses.replace(outputs, value=sign * outputs.value)
         mean = outputs.value / T
-        assert mean_density(signed, objective.bounds.measure) == pytest.approx(mean, rel=1e-12)
+        assert signed.density(objective.bounds.measure) == pytest.approx(mean, rel=1e-12)
 
 
 def reaches() -> tuple[TrajectoryProblem, TrajectoryProblem]:

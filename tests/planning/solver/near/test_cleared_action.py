@@ -6,9 +6,13 @@ import numpy as np
 import pytest
 
 from hovi.discrete.grid import DiscretePath
+from hovi.optimize.trust_region import Options
 from hovi.planning.problem.limits import as_limits
 from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.solver.bounded_action import BoundedAction
 from hovi.planning.solver.limits.limit_rows import LimitRows
+from hovi.planning.solver.methods.bounded_search import BoundedSearch
+from hovi.planning.solver.methods.feasibility import solved_from
 from hovi.planning.solver.near.clearance_rows import ClearanceRows
 from hovi.planning.solver.near.cleared_action import ClearedAction
 from planning.solver.near.test_clearance_rows import problem_of, wavy
@@ -139,3 +143,16 @@ def test_rows_of_parts_are_taken_with_their_intervals_and_values() -> None:
     part._set(problem, *some, near.rounding[early])
     shifted.take([(2, part)])
     np.testing.assert_array_equal(shifted.intervals, part.intervals + 2)
+
+
+def test_only_solves_on_a_central_path_begin_with_a_wide_trust_region() -> None:
+    problem = problem_of("ur5")
+    path, limits = wavy(problem), as_limits(problem.robot, LIMITS)
+    search = BoundedSearch(problem, limits, Options(max_iterations=1), None, path, lazy=True)
+    search.solve(path)
+    solved_from(search, path)
+    search.solve_at_level(path, 1e-2)
+    solved_from(search, path)
+    narrow, wide = ClearedAction.radii[1], BoundedAction.radii[1]
+    assert wide > 10 * narrow
+    assert [step.radius for step in search.history] == [narrow, narrow, wide, narrow]

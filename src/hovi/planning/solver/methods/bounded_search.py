@@ -14,7 +14,7 @@ from hovi.discrete.state import State
 from hovi.optimize.banded_model import BandModel
 from hovi.optimize.barrier import INITIAL_MARGIN, WARM_START_MARGIN, Barrier
 from hovi.optimize.bordered_model import EquationModel
-from hovi.optimize.bounded_objective import BoundedOutcome, Outputs
+from hovi.optimize.bounded_objective import BoundedOutcome
 from hovi.optimize.interior_point import minimize_bounded
 from hovi.optimize.merge_tree import MergeTreeModel
 from hovi.optimize.nearby_bounded import ROOM, follow_bounded
@@ -60,7 +60,6 @@ FINE_HALVINGS = 2, 3
 """The same where a motion within such limits was not found."""
 WARM_MU_RANGE = 1e-7, 1e-4
 """Range of the initial barrier parameter of a warm start, relative to the mean density."""
-
 LEVEL_MARGIN = 0.1
 """Distance of slacks from their bounds at a point of a central path, relative to its parameter."""
 LOOK_AROUND = 0.02
@@ -81,7 +80,8 @@ class BoundedSearch:
     multipliers, unmet: of the constraints, and why they cannot be met, or "".
     last: the problem and the motion of the last solve. solved: its outcome and its objective.
     points: of the central path, with a larger barrier than that of the last solution.
-    timed: whether the duration is free.
+    timed: whether the duration is free. at_level: whether a solve begins on a central path, from
+        where steps may be long.
     along, level: see InteriorPoint. plain: see minimize_bounded. locally_infeasible: see
         MethodResult.
     """
@@ -99,6 +99,7 @@ class BoundedSearch:
     level: float | None = None
     plain: bool = False
     lazy: bool = False
+    at_level: bool = False
     locally_infeasible: bool = False
 
     def __post_init__(self) -> None:
@@ -182,6 +183,7 @@ class BoundedSearch:
             common = self.problem, self.limits, self.margins, algebra, known
             cleared = ClearedAction(*common, self.rows, self.near)
             cleared.exact = self.along is not None and self.level is None  # of other ends
+            cleared.radii = (BoundedAction if self.at_level else ClearedAction).radii
             return cleared
         return BoundedAction(
             self.problem, self.limits, self.margins, algebra, known, self.clearance, self.rows
@@ -189,7 +191,7 @@ class BoundedSearch:
 
     def central_path(self, outcome: Bounded) -> CentralPath:
         """The points at which the barrier of a solve was larger, and its solution."""
-        density = mean_density(outcome.outputs, self.problem.grid.duration)
+        density = outcome.outputs.density(self.problem.grid.duration)
         last = outcome.barrier.mu / density
         before = [(level, x) for level, x in self.points if level > last]
         points = (*before, (last, outcome.x))
@@ -205,7 +207,7 @@ class BoundedSearch:
         These are on the central path of a similar problem only, perhaps between other ends, but the
         next solve may need room.
         """
-        density = mean_density(outcome.outputs, objective.bounds.measure)
+        density = outcome.outputs.density(objective.bounds.measure)
         points = [(product / density, x) for product, x in outcome.marks]
         first, like = points[0]
         before = [
@@ -235,7 +237,7 @@ class BoundedSearch:
             options = dataclasses.replace(options, decrease=decrease, barrier=mu)
             outcome = self.minimized(objective, x, options, start)
             share = float(np.clip(decrease**0.5, ROUND_BARRIER, WARM_MU_RANGE[1]))
-            mu = share * mean_density(outcome.outputs, objective.bounds.measure)
+            mu = share * outcome.outputs.density(objective.bounds.measure)
             y, barrier = outcome.outputs.y, outcome.barrier
             start = None
             if len(y) == len(barrier.s) == len(objective.bounds.lower):
@@ -253,10 +255,13 @@ class BoundedSearch:
         """
         objective = self.objective(self.multipliers)
         outputs = objective.outputs(path)
-        density = mean_density(outputs, objective.bounds.measure)
+        density = outputs.density(objective.bounds.measure)
         margin = min(INITIAL_MARGIN, LEVEL_MARGIN * level)
         start = Barrier.central(objective.bounds, outputs.y, level * density, density, margin)
-        return self.solve(path, start)
+        self.at_level = True
+        outcome = self.solve(path, start)
+        self.at_level = False
+        return outcome
 
     def _solved_under_conditions(self, path: DiscretePath, start: Barrier | None) -> Bounded | None:
         """A solve whose steps meet the conditions at nodes; None where that fails."""
@@ -393,8 +398,3 @@ class BoundedSearch:
                 return approach_sentence(trajectory, distances, approach, margin)
         sentence = worst_sentence(trajectory, self.limits, self.problem.coordinates)
         return sentence + static_sentence(self.problem, self.limits)
-
-
-def mean_density(outputs: Outputs, duration: float) -> float:
-    """|objective| / duration: its mean density."""
-    return max(abs(outputs.value), 1e-12) / duration

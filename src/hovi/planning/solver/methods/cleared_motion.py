@@ -22,7 +22,6 @@ from hovi.planning.solver.limits.limit_rows import LimitRows
 from hovi.planning.solver.methods.bounded_search import (
     Bounded,
     BoundedSearch,
-    mean_density,
 )
 from hovi.planning.solver.methods.motion_legs import Leg, joined, legs_of
 from hovi.planning.solver.multipliers import Multipliers
@@ -236,6 +235,6 @@ def _rough(
     objective, start = search.objective(known, node_tolerance=tolerance), None
     if mu is not None:
         outputs = objective.outputs(path)
-        density = mean_density(outputs, objective.bounds.measure)
+        density = outputs.density(objective.bounds.measure)
         start = Barrier.central(objective.bounds, outputs.y, mu * density)
     return search.minimized(objective, path, options, start), objective.action.multipliers

@@ -21,7 +21,7 @@ from hovi.planning.solver.augmented_lagrangian_rounds import first_multipliers
 from hovi.planning.solver.bounded_action import BoundedAction
 from hovi.planning.solver.central_path import CentralPath
 from hovi.planning.solver.clearance_outputs import ClearanceOutputs
-from hovi.planning.solver.methods.bounded_search import Bounded, BoundedSearch, mean_density
+from hovi.planning.solver.methods.bounded_search import Bounded, BoundedSearch
 from hovi.planning.solver.methods.cleared_motion import cleared_motion
 from hovi.planning.solver.multipliers import Multipliers
 from hovi.planning.solver.penalized_action import LeastViolation, PenalizedAction, least_violation
@@ -219,7 +219,7 @@ def _solved_warm(search: BoundedSearch, known: Barrier, path: DiscretePath) -> B
     outputs = objective.outputs(path)
     start = None
     if len(known.s) == len(outputs.y):
-        mu *= mean_density(outputs, objective.bounds.measure)
+        mu *= outputs.density(objective.bounds.measure)
         start = known.warm(objective.bounds, outputs.y, mu, WARM_MARGIN)
     outcome = search.solve(path, start)
     search.options = whole
@@ -242,7 +242,7 @@ def solved_from(search: BoundedSearch, path: DiscretePath) -> Bounded:
     search.look_around(path)
     objective = search.objective(search.multipliers)
     outputs = objective.outputs(path)
-    mu = NEARBY_MU * mean_density(outputs, objective.bounds.measure)
+    mu = NEARBY_MU * outputs.density(objective.bounds.measure)
     return search.solve(path, Barrier.central(objective.bounds, outputs.y, mu))
 
 
@@ -304,7 +304,7 @@ def _locally_infeasible(search: BoundedSearch, outcome: Bounded) -> str:
         return ""
     rows, search.rows = search.rows, search.fine_rows()
     objective = search.objective(None)
-    density = mean_density(outcome.outputs, objective.bounds.measure)
+    density = outcome.outputs.density(objective.bounds.measure)
     found: list[LeastViolation] = []
     for path in (outcome.x, search.guess, _bumped_guess(search, 0, BUMP_SHARE)):
         each = least_violation(objective, path, density, search.remaining_options())
@@ -333,7 +333,7 @@ def _restored(search: BoundedSearch, outcome: Bounded) -> tuple[Bounded, str]:
     known = first_multipliers(search.problem, outcome.x) if constrained else None
     search.rows = search.coarse_rows()
     objective = search.objective(known)
-    density = mean_density(outcome.outputs, objective.bounds.measure)
+    density = outcome.outputs.density(objective.bounds.measure)
     least = np.inf
     bumped = (_bumped_guess(search, seed) for seed in range(BUMPED_GUESSES))
     for guess in chain([search.guess], bumped):

@@ -14,7 +14,6 @@ from hovi.planning.solver.methods.bounded_search import (
     WARM_MU_RANGE,
     Bounded,
     BoundedSearch,
-    mean_density,
 )
 from hovi.planning.solver.methods.feasibility import feasible_motion, solved_from
 
@@ -103,7 +102,7 @@ def _solved_tighter(search: BoundedSearch, outcome: Bounded, sides: Array) -> Bo
     search.margins = np.clip(search.margins + tighter + looser, 0.0, MAX_MARGIN)
     objective = search.objective(search.multipliers)
     share = float(np.clip(1e-2 * float(sides.max()), *WARM_MU_RANGE))
-    mu = share * mean_density(outcome.outputs, objective.bounds.measure)
+    mu = share * outcome.outputs.density(objective.bounds.measure)
     y, barrier = objective.outputs(outcome.x).y, outcome.barrier
     start = barrier.warm(objective.bounds, y, mu) if len(y) == len(barrier.s) else None
     whole = search.options
