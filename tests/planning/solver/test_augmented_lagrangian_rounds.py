@@ -10,7 +10,7 @@ from hovi.discrete.state import State
 from hovi.optimize.trust_region import Options, Outcome, minimize
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.action_objective import ActionObjective
-from hovi.planning.solver.augmented_lagrangian_rounds import MAX_ROUNDS, minimize_constrained
+from hovi.planning.solver.augmented_lagrangian_rounds import MAX_STUCK, minimize_constrained
 from hovi.planning.solver.multipliers import Multipliers
 from hovi.planning.solver.solver import guess_path
 from hovi.robot.loading import load_robot
@@ -19,7 +19,7 @@ from hovi.schemes import galerkin
 from samples.manifold_robots import chain
 
 
-def test_what_cannot_be_met_is_given_up_at_the_largest_penalty() -> None:
+def test_what_cannot_be_met_is_given_up_after_two_penalties_without_effect() -> None:
     """A passive slide that nothing moves, planned to move."""
     model = chain([pin.JointModelPX(), pin.JointModelPY()])
     model.jointPlacements[2] = pin.SE3.Identity()
@@ -40,4 +40,4 @@ def test_what_cannot_be_met_is_given_up_at_the_largest_penalty() -> None:
     assert not found.met
     assert "'j1'" in found.reason
     assert penalties == sorted(penalties)
-    assert len(penalties) < MAX_ROUNDS / 2
+    assert len(penalties) <= MAX_STUCK + 2

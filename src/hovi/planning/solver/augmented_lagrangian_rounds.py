@@ -26,6 +26,9 @@ PENALTY_GROWTH = 10.0
 """Factor by which a penalty grows if its residual decreases too slowly."""
 SLOW_DECREASE = 0.1
 """Ratio of successive residuals above which their decrease is too slow."""
+STUCK, MAX_STUCK = 0.95, 2
+"""Ratio of successive residuals above which the larger penalty is of no use, and the number of such
+rounds in a row after which the constraints are taken as impossible to meet."""
 MAX_PENALTY_RATIO = 1e9
 """Maximum penalty, relative to the initial one."""
 MAX_ROUNDS = 60
@@ -86,7 +89,7 @@ def minimize_constrained(
     multipliers = known or first_multipliers(problem, path)
     first = multipliers
     decrease = FIRST_DECREASE
-    last = np.inf, np.inf
+    last, stuck = (np.inf, np.inf), 0
     for _ in range(most):
         result = minimize(multipliers, path, decrease)
         path = result.x
@@ -102,7 +105,12 @@ def minimize_constrained(
                 sizes, last, (TORQUE_TOLERANCE, NODE_TOLERANCE), strict=True
             )
         ]
-        if _at_maximum_penalty(multipliers, first, slow):
+        remains = any(
+            size > max(STUCK * before, FEASIBLE_RESIDUAL)
+            for size, before in zip(sizes, last, strict=True)
+        )
+        stuck = stuck + 1 if remains else 0
+        if stuck >= MAX_STUCK or _at_maximum_penalty(multipliers, first, slow):
             break
         multipliers = multipliers.updated(residuals, problem.passive)
         multipliers = multipliers.with_scaled_penalties(
