@@ -43,6 +43,23 @@ def test_a_problem_knows_its_grid_scene_robot_and_ends(two_link: Robot) -> None:
         np.testing.assert_array_equal(end, numbers)
 
 
+def test_between_other_ends_the_finer_problem_shares_what_was_built(two_link: Robot) -> None:
+    first = problem(two_link, REST, State([3.0, 1.0]))
+    known = first.finer
+    for _ in range(2):
+        other = first.between(State([0.1, 0.0]), State([2.0, 1.0]))
+        assert other.finer.ld is known.ld
+        assert other.finer.structure is known.structure
+        np.testing.assert_array_equal(other.finer.boundary[0], [0.1, 0.0])
+        assert other.finer.finer.grid.inner_modes == first.finer.grid.inner_modes + 2
+        first = other.between(REST, State([1.0, 1.0]))  # without a finer problem in between
+    free = first.between(REST, State([3.0, 1.0], free_velocity="all"))
+    assert free.finer.structure is not first.finer.structure
+    assert free.finer.structure.layout.size > first.finer.structure.layout.size
+    coarser = free.on(Grid.uniform(1.0, 2, by_name("galerkin-1")))
+    assert coarser.finer.grid.intervals == 2
+
+
 def test_on_another_grid_it_is_the_problem_that_would_be_built_there(two_link: Robot) -> None:
     first = problem(two_link, State([1, 2], free_velocity="all"), State([3.0, 1.0]))
     assert first.structure.layout.size > 0

@@ -18,7 +18,7 @@ from hovi.planning.problem.limits import as_limits
 from hovi.planning.refinement import resolution
 from hovi.planning.refinement.error_estimate import finer_than
 from hovi.planning.refinement.faults.on_curve import RESOLVED
-from hovi.planning.refinement.resolution import NEARBY, resolved
+from hovi.planning.refinement.resolution import FARTHER, GROWTH, NEARBY, resolved
 from hovi.planning.solver.solver import Solution, solve_on_grid
 from hovi.planning.solver.status import Status
 from hovi.robot.robot import Robot
@@ -165,6 +165,40 @@ def test_replanning_near_a_resolved_motion_keeps_its_estimate(arm_scene: Scene) 
     assert far.error_estimate == pytest.approx(abs(far.cost / true.cost - 1), rel=0.1)
 
 
+@pytest.mark.parametrize(("far", "kept"), [(0.6, True), (1.6, False)])
+def test_the_estimate_of_a_motion_without_limits_is_kept_with_a_margin_farther_away(
+    two_link: Robot, monkeypatch: pytest.MonkeyPatch, far: float, kept: bool
+) -> None:
+    """far: the change of q, and of T v, relative to FARTHER."""
+    scene = Scene(two_link, [hovi.effects.Gravity()])
+    ld = DiscreteLagrangian(scene.effort_lagrangian(), Grid.uniform(1.0, 8, by_name("galerkin-2")))
+    start, end = hovi.State([0.0, 0.0]), np.array([1.2, 0.8])
+    first = hovi.solve(hovi.TrajectoryProblem(ld, start, hovi.State(end)))
+    calls = comparisons(monkeypatch)
+    change = first.replan(goal=end + [0.01, 0.01]).trajectory.v - first.trajectory.v
+    moved = first.replan(goal=end + 0.01 * far * FARTHER / np.abs(change).max())
+    assert moved.success, moved.message
+    assert bool(calls) != kept
+    anew = resolved(dataclasses.replace(moved, error_estimate=None))
+    assert first.error_estimate is not None
+    assert anew.error_estimate is not None
+    assert moved.error_estimate == (GROWTH * first.error_estimate if kept else anew.error_estimate)
+    assert anew.error_estimate <= moved.error_estimate
+
+
+def test_no_estimate_is_kept_farther_away_where_a_joint_whirls(
+    two_link: Robot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scene = Scene(two_link, [hovi.effects.Gravity()])
+    ld = DiscreteLagrangian(scene.effort_lagrangian(), Grid.uniform(1.0, 8, by_name("galerkin-2")))
+    ends = hovi.State([0.0, 0.0]), hovi.State([1.2, 0.8])
+    first = hovi.solve(hovi.TrajectoryProblem(ld, *ends))
+    calls = comparisons(monkeypatch)
+    monkeypatch.setattr(resolution, "whirl", lambda motion: "a whirl")
+    assert first.replan(goal=[1.22, 0.82]).success
+    assert calls
+
+
 def test_within_limits_a_motion_is_compared_with_the_followed_finer_one(
     two_link: Robot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -179,7 +213,7 @@ def test_within_limits_a_motion_is_compared_with_the_followed_finer_one(
     known = resolution.finer_than
     monkeypatch.setattr(resolution, "finer_than", lambda x: calls.append(1) or known(x))
     monkeypatch.setattr(resolution, "NEARBY", 1e-3)
-    monkeypatch.setattr(resolution, "NEARBY_WITHIN_LIMITS", 1e-3)
+    monkeypatch.setattr(resolution, "FARTHER", 1e-3)
     moved = first.replan(goal=[1.204, 0.797])
     again = moved.replan(goal=[1.2, 0.8])
     assert moved.success, moved.message

@@ -34,10 +34,11 @@ class CentroidalState:
 
 def falls_freely(scene: Scene) -> bool:
     """Whether the first joint is a passive floating base on which only gravity acts."""
+    if scene.robot.joint_names[0] not in scene.passive:
+        return False
     model, terms = scene.robot.model, scene.terms
-    floats = kind_of(model.joints[1]) is FLOATING
     alone = sum(parent == 0 for parent in list(model.parents)[1:]) == 1
-    if not (floats and alone and scene.robot.joint_names[0] in scene.passive):
+    if kind_of(model.joints[1]) is not FLOATING or not alone:
         return False
     untouched = terms.torque is None or ca.SX(terms.torque)[:6].is_zero()
     return untouched and terms.symbols.base is None and not scene.model.armature[:6].any()

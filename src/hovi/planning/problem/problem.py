@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from hovi.checks.arguments import check_arguments
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
-from hovi.discrete.grid import DiscretePath, Grid
+from hovi.discrete.grid import MORE_MODES, DiscretePath, Grid
 from hovi.discrete.guess import Boundary, Curve, moved, named_curve, path_on_grid, with_turns
 from hovi.discrete.path_of_any_order import moved_any, path_of_any_order, polynomial, with_fixed
 from hovi.discrete.state import Periodic, State
@@ -48,9 +48,6 @@ Mask = npt.NDArray[np.bool_]
 
 LIMITED_ORDERS = 2, 3
 """Orders of the Lagrangians whose problems may have limits, obstacles, via points and frames."""
-MORE_MODES = 2
-"""Additional inner modes of the problem for error estimates. With one more, both costs may have
-nearly the same error, which their difference would not show."""
 
 
 @check_arguments
@@ -178,22 +175,29 @@ class TrajectoryProblem(ProblemSummary):
 
     def on(self, grid: Grid) -> TrajectoryProblem:
         """The same problem on another grid."""
-        ld = DiscreteLagrangian(self.ld.lagrangian, grid)
-        T = self.grid.duration
+        return self._with(DiscreteLagrangian(self.ld.lagrangian, grid))
+
+    def _with(self, ld: DiscreteLagrangian) -> TrajectoryProblem:
+        grid, T = ld.grid, self.grid.duration
         if self.conditions or self.holds or abs(grid.duration - T) > 1e-12 * T:
             return dataclasses.replace(self, ld=ld)
         for scheme, _ in grid.groups:
             require_regular(scheme)
         problem = copy.copy(self)  # nothing else depends on the grid
         object.__setattr__(problem, "ld", ld)
-        for name in ("structure", "torque_moments", "finer"):
+        for name in ("structure", "torque_moments", "finer", "_finer_of_last"):
             problem.__dict__.pop(name, None)
         return problem
 
     @cached_property
     def finer(self) -> TrajectoryProblem:
         """The same problem with more inner modes, for error estimates."""
-        return self.on(self.grid.enriched(MORE_MODES))
+        last = vars(self).get("_finer_of_last")
+        if last is None:
+            return self.on(self.grid.enriched(MORE_MODES))
+        finer = self._with(last.ld)
+        object.__setattr__(finer, "structure", last.structure)
+        return finer
 
     def between(self, start: State, goal: State | FrameGoal | Periodic) -> TrajectoryProblem:
         """The same problem between other states, sharing what was built for this one."""
@@ -201,6 +205,8 @@ class TrajectoryProblem(ProblemSummary):
         same_ends = np.array_equal(problem.free_ends, self.free_ends)
         if same_ends and problem.periodic == self.periodic:
             object.__setattr__(problem, "structure", self.structure)
+            last = vars(self).get("finer", vars(self).get("_finer_of_last"))
+            object.__setattr__(problem, "_finer_of_last", last)
         return problem
 
     def path(self, curve: Curve) -> DiscretePath:
@@ -269,12 +275,9 @@ class TrajectoryProblem(ProblemSummary):
         if not self._has_free_ends:
             return self.boundary
         on, free = self.coordinates, self.free_ends
-        q = np.stack(
-            [
-                on.integrate(a, np.where(free[i, 0], on.difference(a, b), 0.0))
-                for i, (a, b) in enumerate(((q0, q[0]), (q1, q[-1])))
-            ]
-        )
+        changes = on.difference(q0, q[0]), on.difference(q1, q[-1])
+        free_q0, free_q1 = np.where(free[:, 0], changes, 0.0)
+        q = np.stack([on.integrate(q0, free_q0), on.integrate(q1, free_q1)])
         v = np.where(free[:, 1], v[[0, -1]], np.stack([v0, v1]))
         if self.periodic:
             return q[0], v[0], q[0] + (q1 - q0), v[0]
@@ -282,10 +285,7 @@ class TrajectoryProblem(ProblemSummary):
 
     @cached_property
     def inertial_torque(self) -> float:
-        """max diag M(q0) / T^2: torque scale of a motion by 1 rad or 1 m, in [N m] or [N].
-
-        0 without a robot.
-        """
+        """max diag M(q0)/T^2, in [N m] or [N]: torques of a motion by 1; 0 without a robot."""
         if not self.about_robot:
             return 0.0
         mass = MassMatrix(self.scene.model)(self.boundary[0][None])[0]

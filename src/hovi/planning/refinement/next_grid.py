@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from hovi.discrete.grid import DiscretePath, Grid
+from hovi.discrete.grid import MORE_MODES, DiscretePath, Grid
 from hovi.discrete.guess import stretched
-from hovi.planning.problem.problem import MORE_MODES, TrajectoryProblem
+from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.problem.tolerance import CURVE_TOLERANCE, Quantity
 from hovi.planning.refinement.candidate import Candidate, contributions
 from hovi.planning.refinement.error_estimate import FinerSolution, estimate_against

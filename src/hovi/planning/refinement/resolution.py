@@ -7,6 +7,7 @@ the discrete action, but not the integral along its curve.
 from __future__ import annotations
 
 import dataclasses
+from functools import cached_property
 from typing import Literal, Self
 
 import numpy as np
@@ -58,9 +59,9 @@ Array = npt.NDArray[np.float64]
 NEARBY = 0.05
 """Change of q, and of T v, in [rad] or [m], up to which a motion near one that passed is not
 compared with a finer one again."""
-NEARBY_WITHIN_LIMITS, GROWTH = 0.5, 2.0
-"""The same change within limits, without obstacles and equations, while the same limits hold the
-motion, and the factor of the estimate that is kept beyond NEARBY."""
+FARTHER, GROWTH = 0.5, 2.0
+"""The same change without obstacles and equations, while the same limits hold the motion, and no
+joint whirls where there are none; and the factor of the estimate that is kept beyond NEARBY."""
 PRICE_CHANGE, LEAST_PRICE = 0.25, 0.02
 """Relative change of the price of a limit up to which it is the same one, and the least price, as a
 share of the cost, that this is relative to: see limit_prices."""
@@ -191,27 +192,44 @@ class Resolution(MotionCheck):
     """The check of motions that are replanned from a resolved one.
 
     path, cost: of the resolved motion. estimate: of the relative error of its cost, kept for
-    motions near it. finer: the solution it was compared with, or None. on_curve: the relative
-    difference of its costs at the points and along its curve, infinite where it is to be looked at
-    anew. prices: of its limits; None without limits, and where they are not known.
+    motions near it. finer: the solution it was compared with, or None. motion: the resolved one;
+    None if that was a longer one.
     """
 
     path: DiscretePath
     cost: float
     estimate: float
     finer: FinerSolution | None = None
-    on_curve: float = np.inf
-    prices: Array | None = None
+    motion: Solution | None = None
 
     @classmethod
     def of(cls, solution: Solution, finer: FinerSolution | None) -> Self:
         """That of a solution with an estimate. finer: the one it was compared with."""
-        assert solution.problem is not None
         assert solution.error_estimate is not None
-        known = solution.trajectory.path, solution.cost, solution.error_estimate, finer
-        if not solution.problem.limited or solution.forces is None:
-            return cls(*known)
-        return cls(*known, difference_on_curve(solution), limit_prices(solution))
+        motion = dataclasses.replace(solution, check=None)
+        return cls(solution.trajectory.path, solution.cost, solution.error_estimate, finer, motion)
+
+    @cached_property
+    def on_curve(self) -> float:
+        """The relative difference of its costs at the points and on the curve; inf if unknown."""
+        return np.inf if self.motion is None else difference_on_curve(self.motion)
+
+    @cached_property
+    def prices(self) -> Array | None:
+        """Those of its limits; None without limits, and where they are not known."""
+        motion = self.motion
+        if motion is None or motion.problem is None or motion.forces is None:
+            return None
+        return limit_prices(motion) if motion.problem.limited else None
+
+    @cached_property
+    def farthest(self) -> float:
+        """NEARBY, or FARTHER where that holds, if the same limits hold the motion."""
+        motion = self.motion
+        if motion is None or motion.problem is None or not _is_plain(motion.problem):
+            return NEARBY
+        calm = self.prices is not None if motion.problem.limited else whirl(motion) is None
+        return FARTHER if calm else NEARBY
 
     def __call__(self, solution: Solution) -> Solution:
         """The solution as `resolved` returns it, with (a) alone for a motion that is near."""
@@ -264,24 +282,24 @@ class Resolution(MotionCheck):
         dq = problem.coordinates.difference(self.path.q, path.q)
         dv = problem.grid.duration * (path.v - self.path.v)
         far = float(max(np.abs(dq).max(), np.abs(dv).max()))
-        most, more = NEARBY, 0.0
+        if far > NEARBY and far > self.farthest:
+            return None
+        more = 0.0
         if self.prices is not None:
             changes = np.abs(limit_prices(solution) - self.prices)
             if (changes > PRICE_CHANGE * np.maximum(self.prices, LEAST_PRICE)).any():
                 return None
             more = ERROR_PER_PRICE * float(changes.max())
-            if _within_limits_alone(problem):
-                most = NEARBY_WITHIN_LIMITS
         estimate = (1.0 if far <= NEARBY else GROWTH) * self.estimate + more
         # an estimate is LIMITED_SAFETY_FACTOR times the difference that is to be small
         small = (far <= NEARBY and more == 0.0) or estimate <= LIMITED_SAFETY_FACTOR * RESOLVED
-        return estimate if far <= most and small else None
+        return estimate if small else None
 
 
-def _within_limits_alone(problem: TrajectoryProblem) -> bool:
-    """Whether there are the same limits at all times, and neither obstacles nor equations."""
-    one = problem.limits is not None and not problem.limits.parts
-    return one and problem.distances is None and not problem.constrained
+def _is_plain(problem: TrajectoryProblem) -> bool:
+    """Whether there are neither obstacles nor equations, and no segments."""
+    alone = problem.distances is None and not problem.constrained
+    return alone and problem.ld.segments is None
 
 
 def _compared_with_finer(solution: Solution) -> tuple[Solution, str, FinerSolution | None]:
