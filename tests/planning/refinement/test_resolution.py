@@ -175,7 +175,7 @@ def test_the_estimate_of_a_motion_without_limits_is_kept_with_a_margin_farther_a
     start, end = hovi.State([0.0, 0.0]), np.array([1.2, 0.8])
     first = hovi.solve(hovi.TrajectoryProblem(ld, start, hovi.State(end)))
     calls = comparisons(monkeypatch)
-    change = first.replan(goal=end + [0.01, 0.01]).trajectory.v - first.trajectory.v
+    change = first.replan(goal=end + 0.01).trajectory.v - first.trajectory.v
     moved = first.replan(goal=end + 0.01 * far * FARTHER / np.abs(change).max())
     assert moved.success, moved.message
     assert bool(calls) != kept
