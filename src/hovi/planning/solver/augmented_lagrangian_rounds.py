@@ -177,12 +177,29 @@ def unmet_sentence(problem: TrajectoryProblem, path: DiscretePath, residuals: Re
             f"no motion was found with zero torque at passive joint {joints}: the remaining torque "
             f"is {residuals.torque_share:.3g} of the largest; allow more time or change the goal"
         )
+    t, error = _worst_condition(problem, path, residuals)
+    return (
+        f"the goal at t = {t:.4g} s cannot be met: {error}; change the goal or try another "
+        "initial guess"
+    )
+
+
+def missed_clause(problem: TrajectoryProblem, path: DiscretePath, residuals: Residuals) -> str:
+    """The constraint that a motion misses most, as a clause."""
+    if residuals.torque_share > FEASIBLE_RESIDUAL or not problem.conditions:
+        joints = ", ".join(repr(joint) for joint in problem.scene.passive)
+        return f"passive joint {joints} has {residuals.torque_share:.3g} of the largest torque"
+    t, error = _worst_condition(problem, path, residuals)
+    return f"the goal at t = {t:.4g} s is missed: {error}"
+
+
+def _worst_condition(
+    problem: TrajectoryProblem, path: DiscretePath, residuals: Residuals
+) -> tuple[float, str]:
+    """The time in [s] of the condition with the largest residual, and by how much it is missed."""
     worst = max(
         zip(problem.conditions, residuals.nodes, strict=True),
         key=lambda pair: float(np.max(np.abs(pair[1]), initial=0.0)),
     )[0]
     error = worst.condition.describe(path.q[worst.node], path.v[worst.node])
-    return (
-        f"the goal at t = {problem.grid.t[worst.node]:.4g} s cannot be met: {error}; change the "
-        "goal or try another initial guess"
-    )
+    return float(problem.grid.t[worst.node]), error

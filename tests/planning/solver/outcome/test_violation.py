@@ -77,7 +77,19 @@ def test_a_passive_joint_with_a_torque_is_named(scene: hovi.Scene) -> None:
     ld = hovi.DiscreteLagrangian(hinge.effort_lagrangian(), free.trajectory.grid)
     problem = hovi.TrajectoryProblem(ld, hovi.State(START), hovi.State(GOAL))
     other = dataclasses.replace(free, problem=problem)
-    assert "passive joints have" in other.violation
+    assert other.violation.startswith("passive joint 'elbow' has ")
+    assert other.violation.endswith(" of the largest torque")
+
+
+def test_a_via_point_that_is_missed_is_named_with_its_time(found: hovi.Solution) -> None:
+    robot = found.problem.robot  # type: ignore[union-attr]
+    x, y, z = robot.frame_pose("tip", found.trajectory.sample([0.5]).q[0])[:3, 3]
+    via = (hovi.Via(0.5, hovi.FrameGoal("tip", position=[x, y, z])),)
+    assert of_problem(found, via=via).usable
+    via = (hovi.Via(0.5, hovi.FrameGoal("tip", position=[x, y, z + 0.02])),)
+    missed = of_problem(found, via=via).violation
+    assert missed.startswith("the goal at t = 0.5 s is missed: ")
+    assert "0.02 m" in missed
 
 
 def test_a_motion_that_ran_out_of_time_says_whether_it_can_be_used(scene: hovi.Scene) -> None:

@@ -8,7 +8,11 @@ from hovi.planning.problem.limit_violation import excess_along, worst_sentence
 from hovi.planning.problem.limits import Limits
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.action_objective import ActionObjective
-from hovi.planning.solver.augmented_lagrangian_rounds import FEASIBLE_RESIDUAL, within
+from hovi.planning.solver.augmented_lagrangian_rounds import (
+    FEASIBLE_RESIDUAL,
+    missed_clause,
+    within,
+)
 from hovi.planning.solver.receding.last_motion import MET, misses
 
 
@@ -28,10 +32,7 @@ def violation_of(problem: TrajectoryProblem, motion: Trajectory) -> str:
     if problem.constrained:
         residuals = ActionObjective(problem).residuals(path)
         if not within(residuals, FEASIBLE_RESIDUAL, FEASIBLE_RESIDUAL):
-            return (
-                f"goals at nodes are missed by up to {residuals.node_error:.3g}, and passive "
-                f"joints have {residuals.torque_share:.3g} of the largest torque"
-            )
+            return missed_clause(problem, path, residuals)
     limits = problem.limits
     if limits is not None and _exceeded(motion, limits):
         return worst_sentence(motion, limits, problem.coordinates)
