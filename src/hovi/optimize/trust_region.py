@@ -385,16 +385,16 @@ class _ShiftSearch:
         u = self.model.random_vector(seed=0)
         for _ in range(4):
             u = factor.solve(self.model.metric_product(u))
-            u /= np.sqrt(np.vdot(u, self.model.metric_product(u)))
-        if np.vdot(self.model.gradient, u) > 0:
-            u = -u
+            square = float(np.vdot(u, self.model.metric_product(u)))
+            if not square > 0.0:
+                raise ArithmeticError("H + shift D is singular to rounding errors")
+            u /= math.sqrt(square)
+        u = -u if np.vdot(self.model.gradient, u) > 0 else u
         Du = self.model.metric_product(u)
         b = float(np.vdot(trial.step, Du))
         length = -b + np.sqrt(max(b * b + self.radius**2 - trial.norm**2, 0.0))
         step = trial.step + length * u
-        rest = factor.solve(Du)
         # Rayleigh quotient u.H u by one more inverse iteration
-        rayleigh = 1.0 / float(np.vdot(Du, rest)) - trial.shift
+        rayleigh = 1.0 / float(np.vdot(Du, factor.solve(Du))) - trial.shift
         decrease = trial.decrease + trial.shift * b * length - 0.5 * length**2 * min(rayleigh, 0.0)
-        negligible = trial.norm < 1e-6 * self.radius
-        return Trial(step, decrease, trial.shift, self.radius, negligible)
+        return Trial(step, decrease, trial.shift, self.radius, trial.norm < 1e-6 * self.radius)

@@ -125,3 +125,15 @@ def test_an_end_with_a_given_acceleration_has_the_torque_of_inverse_dynamics(
     ld = DiscreteLagrangian(scene.effort_lagrangian(), Grid.uniform(2.0, 2, galerkin(1, 3)))
     asked = TrajectoryProblem(ld, hovi.State(REST), hovi.State(q, v, a=a), limits)
     assert ("at the goal is" in unavoidable_torque(asked, limits)) == (share < 1)
+
+
+@pytest.mark.parametrize(("smooth", "what"), [(False, "may not exist"), (True, "hardly exists")])
+def test_a_frame_goal_that_cannot_be_held_is_told_with_what_smooth_asks(
+    ur5: hovi.Robot, smooth: bool, what: str
+) -> None:
+    load = hovi.effects.Payload(frame="tool0", mass=14.0)
+    scene = hovi.Scene(ur5, [hovi.effects.Gravity(), load])
+    goal = hovi.FrameGoal("tool0", position=[0.85, 0.1, 0.1])
+    given = {"smooth": smooth, "limits": "urdf", "time_limit": 0.5}
+    with pytest.warns(hovi.errors.HoviWarning, match=what):
+        hovi.plan(scene, REST, goal, 2.0, **given)

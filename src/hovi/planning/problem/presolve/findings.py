@@ -56,9 +56,11 @@ def about_limits(
     if short is not None:
         warnings.append(f"{short.clause}.")
     if not at_frame:
+        what = "the motion has to begin or end with an acceleration there, and may not exist"
+        if problem.ld.k > 2 and not problem.free_ends[1, 2].any():
+            what = "the motion ends without an acceleration there, and hardly exists"
         warnings += [
-            f"{clause}: the motion has to begin or end with an acceleration there, and may not "
-            "exist; reduce the load, or change the ends or the limits."
+            f"{clause}: {what}; reduce the load, or change the ends or the limits."
             for clause in held_still(problem, limits)
         ]
     return Findings("", tuple(warnings))
