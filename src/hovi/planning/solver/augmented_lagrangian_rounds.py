@@ -179,8 +179,8 @@ def unmet_sentence(problem: TrajectoryProblem, path: DiscretePath, residuals: Re
         )
     t, error = _worst_condition(problem, path, residuals)
     return (
-        f"the goal at t = {t:.4g} s cannot be met: {error}; change the goal or try another "
-        "initial guess"
+        f"the goal at t = {t:.4g} s cannot be met: {error}; change the goal, increase the "
+        "duration or try another initial guess"
     )
 
 

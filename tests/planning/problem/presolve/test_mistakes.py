@@ -283,6 +283,18 @@ POSSIBLE: dict[str, tuple[dict[str, Any], tuple[str, ...]]] = {
         ARM | {"limits": "none", "goal": {"q": [90.0, -45.0]}},
         ("shoulder is 90 rad in a given configuration", "looks like degrees", "1.571 rad"),
     ),
+    "a duration in milliseconds": (
+        UR5 | {"duration": 1500.0} | BRIEF,
+        ("the duration of 1500 s looks like milliseconds, which are 1.5 s", "take 0.38 s"),
+    ),
+    "a payload in grams": (
+        UR5 | {"effects": GRAVITY | {"payload": {"frame": "tool0", "mass": 500.0}}} | BRIEF,
+        ("the payload of 500 kg looks like grams, which are 0.5 kg: the robot has 17 kg",),
+    ),
+    "gravity in millimetres": (
+        UR5 | {"effects": {"gravity": {"acceleration": 9810.0}}} | BRIEF,
+        ("a gravity of 9810 m/s^2 looks like mm/s^2, which are 9.81 m/s^2",),
+    ),
     "an orientation in degrees": (
         UR5 | {"goal": HANDLE | {"rpy": [180.0, 0.0, 90.0]}} | BRIEF,
         ("a frame goal's rpy = (180, 0, 90) rad looks like degrees", "(3.142, 0, 1.571) rad"),

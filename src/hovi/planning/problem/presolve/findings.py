@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
+import numpy as np
+import pinocchio as pin
+
 from hovi.discrete.state import Periodic, State
 from hovi.planning.clearance.clearance import Clearance
 from hovi.planning.problem.contradictions import contradiction
@@ -11,7 +16,15 @@ from hovi.planning.problem.presolve.end_torques import held_still
 from hovi.planning.problem.presolve.legs import Stop, frame_too_far
 from hovi.planning.problem.presolve.length_slips import length_slips
 from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.scene.scene import Scene
 from hovi.system.dataclass import dataclass
+
+LONG, MANY_TIMES = 100.0, 500.0
+"""Duration in [s], and its ratio to the time at the velocity limits, from which both may have been
+meant in milliseconds."""
+MANY_ROBOTS, STRONG = 10.0, 1e3
+"""Mass of a payload, relative to the robot's, from which it may have been meant in grams, and the
+gravity from which it may have been meant in mm/s^2, in [m/s^2]."""
 
 
 @dataclass(frozen=True)
@@ -72,9 +85,39 @@ def _via(problem: TrajectoryProblem) -> list[Stop]:
 
 
 def slips(problem: TrajectoryProblem) -> list[str]:
-    """Sentences about lengths and angles of a problem that look like other units."""
+    """Sentences about what looks like other units: lengths, angles, durations, masses, gravity."""
     states = [(x.goal, x.name) for x in _via(problem) if isinstance(x.goal, State)]
     inner = [state.on(problem.robot, name)[0] for state, name in states]
     q = [problem.boundary[0], *inner]
     ends = [] if isinstance(problem.goal, FrameGoal) else [problem.boundary[2]]
-    return list(length_slips(problem.scene, problem.clearance or Clearance(), [*q, *ends]))
+    lengths = length_slips(problem.scene, problem.clearance or Clearance(), [*q, *ends])
+    return [*lengths, *_long_durations(problem), *_heavy_loads(problem.scene)]
+
+
+def _long_durations(problem: TrajectoryProblem) -> Iterator[str]:
+    """The duration, if it is long and hundreds of times what the URDF's velocities take."""
+    T, robot = problem.grid.duration, problem.robot
+    speed = np.where(robot.model.velocityLimit > 0.0, robot.model.velocityLimit, np.inf)
+    distance = np.abs(robot.difference(problem.boundary[0], problem.boundary[2]))
+    least = float((distance / speed).max())
+    if least > 0.0 and max(LONG, MANY_TIMES * least) <= T:
+        yield (
+            f"the duration of {T:g} s looks like milliseconds, which are {1e-3 * T:g} s: at the "
+            f"velocity limits of the URDF, the joints take {least:.2g} s."
+        )
+
+
+def _heavy_loads(scene: Scene) -> Iterator[str]:
+    """Payloads that weigh many times what the robot does, and gravity that no planet has."""
+    for effect in scene.effects:
+        values = vars(effect)
+        if effect.key == "payload":
+            mass, own = values["mass"], pin.computeTotalMass(scene.robot.model)
+            if mass > MANY_ROBOTS * own > 0.0:
+                yield (
+                    f"the payload of {mass:g} kg looks like grams, which are {1e-3 * mass:g} kg: "
+                    f"the robot has {own:.3g} kg."
+                )
+        if effect.key == "gravity" and values["acceleration"] > STRONG:
+            g = values["acceleration"]
+            yield f"a gravity of {g:g} m/s^2 looks like mm/s^2, which are {1e-3 * g:g} m/s^2."
