@@ -14,6 +14,7 @@ import hovi
 from hovi.discrete.curve_integral import integral_along
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import Grid
+from hovi.errors import HoviWarning
 from hovi.planning.problem.limits import as_limits
 from hovi.planning.refinement import resolution
 from hovi.planning.refinement.error_estimate import finer_than
@@ -365,7 +366,8 @@ def test_a_motion_of_half_an_hour_on_few_intervals_is_no_minimum(name: str, sche
     """As where milliseconds were meant: between the points the arm whirls or falls."""
     task = hovi.load_task(hovi.example(name))
     options = {"scheme": scheme, "tolerance": None, "intervals": 16, **FAST}
-    found = hovi.plan_task(dataclasses.replace(task, duration=2000.0), **options, starts=1)
+    with pytest.warns(HoviWarning, match="the duration of 2000 s looks like milliseconds"):
+        found = hovi.plan_task(dataclasses.replace(task, duration=2000.0), **options, starts=1)
     assert not found.success
     assert found.status in (Status.UNRESOLVED, Status.DIVERGED)
 
