@@ -84,3 +84,21 @@ def test_a_duration_too_short_for_the_velocity_says_how_long_it_takes(arm_scene:
     assert solution.nit == 0
     assert "'shoulder'" in solution.message
     assert "takes 1 s" in solution.message
+
+
+@pytest.mark.parametrize("end", ["start", "goal"])
+def test_links_that_overlap_each_other_leave_no_obstacle_to_move(ur5: hovi.Robot, end: str) -> None:
+    states = {"start": np.zeros(6), "goal": np.zeros(6)}
+    states[end] = np.array([0.0, 0.0, 3.1, 0.0, 0.0, 0.0])
+    solution = hovi.plan(hovi.Scene(ur5), *states.values(), 3.0, self_collision=True)
+    assert f"at the {end} link 'upper_arm_link' and link 'wrist_1_link'" in solution.message
+    assert f"; change the {end}. " in solution.message
+
+
+@pytest.mark.parametrize("end", ["start", "goal"])
+def test_a_link_in_an_obstacle_leaves_the_obstacle_to_move(ur5: hovi.Robot, end: str) -> None:
+    states = {"start": np.full(6, 0.5), "goal": np.full(6, 0.5)}
+    states[end] = np.zeros(6)
+    ball = hovi.Sphere([0.8, 0.19, 0.0], 0.1, name="ball")
+    solution = hovi.plan(hovi.Scene(ur5), *states.values(), 3.0, obstacles=[ball])
+    assert f"; change the {end} or move the obstacle. " in solution.message

@@ -88,7 +88,7 @@ def _via_outside(problem: TrajectoryProblem, limits: Limits) -> str:
 
 
 def _end_in_obstacle(problem: TrajectoryProblem) -> str:
-    """Which end overlaps an obstacle or violates the margin; "" if none does."""
+    """At which end a pair of shapes overlaps or violates the margin; "" if at none."""
     if problem.distances is None or problem.clearance is None:
         return ""
     margin, pairs = float(problem.clearance.margin), problem.distances.pairs
@@ -101,10 +101,8 @@ def _end_in_obstacle(problem: TrajectoryProblem) -> str:
         if d[k] < margin - MARGIN_TOLERANCE:
             distance = float(d[k] - problem.distances.allowance[k])
             needed = "" if distance < 0 else f", less than the margin of {margin:g} m"
-            return (
-                f"at the {end} {pairs[k]} {distance_in_words(distance)}{needed}; change the "
-                f"{end} or move the obstacle"
-            )
+            advice = f"change the {end}" + (" or move the obstacle" if pairs[k].obstacle else "")
+            return f"at the {end} {pairs[k]} {distance_in_words(distance)}{needed}; {advice}"
     goals = [(problem.goal, "goal"), *((via.goal, "via point") for via in problem.via)]
     for goal, name in goals:
         if isinstance(goal, FrameGoal):
