@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import warnings
 from pathlib import Path
 
 import coal
@@ -236,3 +237,20 @@ def test_an_object_that_does_not_fit_the_robot_is_refused(
         hovi.holding(panda, [crate(), crate()])
     with pytest.raises(InputError, match=r"was given as a pinocchio\.Model"):
         hovi.holding(hovi.load_robot(panda.model), crate(frame="panda_hand"))
+
+
+def test_a_link_that_it_always_overlaps_is_to_be_named_where_it_may_touch(ur5: hovi.Robot) -> None:
+    """The box is as long as the hand and the wrist; a warning is told once of each robot."""
+    shape = hovi.Box([0.1, 0.1, 1.2], [0, 0, 0.1])
+    for name, may_touch in (("pole", []), ("rod", ["wrist_1_link"])):
+        pole = hovi.Grasped(shape, "tool0", 1.0, name, may_touch=may_touch)
+        clearance = hovi.PlanOptions(self_collision=True, grasped=[pole]).clearance
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            pairs = Distances(hovi.holding(ur5, pole), clearance).pairs
+        assert {"wrist_1_link", name} not in [{pair.link, pair.other} for pair in pairs]
+        sentences = [str(each.message) for each in caught]
+        assert len(sentences) == (1 if not may_touch else 0)
+        for sentence in sentences:
+            assert "between links 'wrist_1_link' and 'pole': these" in sentence
+            assert sentence.endswith("name the links in `may_touch` of the grasped object.")

@@ -81,7 +81,7 @@ class Distances:
                         pairs.append(Pair(links[i], obstacle.name, True))
                         ends.append((i, number))
         if clearance.self_collision:
-            for i, j in self_collision_pairs(robot):
+            for i, j in self_collision_pairs(robot, clearance.may_touch):
                 pairs.append(Pair(links[i], links[j], False))
                 ends.append((i, j))
         if not pairs:

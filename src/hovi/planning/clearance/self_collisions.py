@@ -13,6 +13,7 @@ from hovi.planning.clearance.convex_shapes import convex_geometry
 from hovi.planning.clearance.pair_distances import PairDistances
 from hovi.robot.robot import Robot
 from hovi.robot.srdf import checked_pairs
+from hovi.robot.urdf.added_link import added_links
 
 Array = npt.NDArray[np.float64]
 
@@ -23,18 +24,39 @@ FIRST_SAMPLES = 8
 
 
 @lru_cache(maxsize=16)
-def self_collision_pairs(robot: Robot) -> tuple[tuple[int, int], ...]:
+def self_collision_pairs(
+    robot: Robot, may_touch: tuple[tuple[str, str], ...] = ()
+) -> tuple[tuple[int, int], ...]:
     """Pairs of shapes, by index in the convex geometry, that a motion can keep apart.
 
     All pairs of shapes on joints of which neither is the parent of the other, except those that the
     SRDF disables, and those that overlap at every one of many configurations: a warning names them.
+    may_touch: pairs of names of links about which there is no warning.
     """
+    apart, touching = _sorted_pairs(robot)
+    allowed = {frozenset(each) for each in may_touch}
+    links = [pair for pair in touching if frozenset(pair) not in allowed]
+    grasped = added_links(robot.model)
+    for held, advice in (
+        (False, "disable them in an SRDF"),
+        (True, "name the links in `may_touch` of the grasped object"),
+    ):
+        named = [pair for pair in links if held != grasped.isdisjoint(pair)]
+        if named:
+            warn(_sentence(robot, named, advice))
+    return apart
+
+
+@lru_cache(maxsize=16)
+def _sorted_pairs(robot: Robot) -> tuple[tuple[tuple[int, int], ...], tuple[tuple[str, str], ...]]:
+    """The pairs of shapes that come apart, and the links of the others, each pair once."""
     geometry = convex_geometry(robot)
     pairs = checked_pairs(robot.model, geometry, robot.semantics.disabled)
     touching = _always_overlapping(robot, geometry, pairs)
-    if touching:
-        warn(_sentence(robot, geometry, touching))
-    return tuple(pair for pair in pairs if pair not in touching)
+    frames = [shape.parentFrame for shape in geometry.geometryObjects]
+    links = [str(robot.model.frames[frame].name) for frame in frames]
+    named = dict.fromkeys((links[i], links[j]) for i, j in touching)
+    return tuple(pair for pair in pairs if pair not in touching), tuple(named)
 
 
 def _always_overlapping(
@@ -64,14 +86,9 @@ def _samples(robot: Robot) -> Array:
     return q
 
 
-def _sentence(robot: Robot, geometry: pin.GeometryModel, touching: list[tuple[int, int]]) -> str:
-    shapes = geometry.geometryObjects
-    links = [
-        tuple(str(robot.model.frames[shapes[k].parentFrame].name) for k in pair)
-        for pair in touching
-    ]
-    names = ", ".join(f"{a!r} and {b!r}" for a, b in dict.fromkeys(links))
+def _sentence(robot: Robot, links: list[tuple[str, str]], advice: str) -> str:
+    names = ", ".join(f"{a!r} and {b!r}" for a, b in links)
     return (
         f"the collision shapes of robot {robot.name!r} overlap at every configuration between "
-        f"links {names}: these pairs are not kept apart; disable them in an SRDF."
+        f"links {names}: these pairs are not kept apart; {advice}."
     )

@@ -54,7 +54,8 @@ class Grasped:
     inertia: (Ixx, Iyy, Izz, Ixy, Ixz, Iyz) about that center in the object's axes, in [kg m^2].
         Both are by default those of a homogeneous body of that shape.
     may_touch: names of obstacles and links from which it need not keep the margin: it may overlap
-        them by TOUCH_DEPTH, a millimetre.
+        them by TOUCH_DEPTH, a millimetre. Links that it overlaps at every configuration are not
+        kept apart from it, with a warning unless they are named here.
     Raises InputError for other values.
     """
 

@@ -11,6 +11,8 @@ import pinocchio as pin
 from hovi.robot.urdf.check import checked_urdf
 from hovi.system.dataclass import dataclass
 
+_JOINT_ENDING = "_grasp"
+"""Ending of the name of the joint of a link that is added, after the name of the link."""
 _COLOR = "0.30 0.55 0.35 1"
 """Of a link that is added: green."""
 
@@ -60,11 +62,23 @@ def with_link(text: str, name: str, added: AddedLink) -> str:
                 color = {"name": f"{added.name}_color"}
                 material = ElementTree.SubElement(element, "material", color)
                 ElementTree.SubElement(material, "color", {"rgba": _COLOR})
-    joint = ElementTree.SubElement(robot, "joint", {"name": f"{added.name}_grasp", "type": "fixed"})
+    name = added.name + _JOINT_ENDING
+    joint = ElementTree.SubElement(robot, "joint", {"name": name, "type": "fixed"})
     _origin(joint, added.placement)
     ElementTree.SubElement(joint, "parent", {"link": added.parent})
     ElementTree.SubElement(joint, "child", {"link": added.name})
     return ElementTree.tostring(robot, encoding="unicode")
+
+
+def added_links(model: pin.Model) -> frozenset[str]:
+    """Names of the links of a model that `with_link` added to its URDF."""
+    frames = list(model.frames)
+    return frozenset(
+        str(frame.name)
+        for frame in frames
+        if frame.type == pin.FrameType.BODY
+        and frames[frame.parentFrame].name == frame.name + _JOINT_ENDING
+    )
 
 
 def _origin(element: ElementTree.Element, placement: pin.SE3) -> None:
