@@ -81,6 +81,18 @@ def test_a_goal_out_of_reach_is_only_suspected_where_millimetres_would_be_in_rea
         assert bool(hint) == suspected
 
 
+@pytest.mark.parametrize(("away", "unit"), [
+    (60.0, "centimetres, which are (0.6, 0, 0) m"), (64.0, "millimetres, which are (0.064, 0, 0)"),
+    (19.0, ""), (21.0, "centimetres, which are (0.21, 0, 0) m"),
+])  # fmt: skip
+def test_a_goal_that_millimetres_would_place_in_the_base_is_suspected_in_centimetres(
+    ur5: hovi.Robot, away: float, unit: str
+) -> None:
+    hint = hint_on_frame(ur5, hovi.FrameGoal("tool0", position=[away, 0.0, 0.0]))
+    assert bool(hint) == bool(unit)
+    assert unit in hint
+
+
 def test_more_equations_than_joints_are_counted_for_the_joints_that_move_the_frame(
     ur5: hovi.Robot,
 ) -> None:

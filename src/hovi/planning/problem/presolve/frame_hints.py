@@ -1,4 +1,4 @@
-"""Why a frame probably misses its goal: millimetres for metres, or more equations than joints."""
+"""Why a frame probably misses its goal: other units of length, or more equations than joints."""
 
 from __future__ import annotations
 
@@ -10,6 +10,11 @@ from hovi.robot.tip_frame import moves_frame
 
 MILLIMETRE = 1e-3
 """A millimetre, in [m]."""
+CENTIMETRE = 1e-2
+"""A centimetre, in [m]."""
+NEAR_BASE = 0.05
+"""Share of the reach below which a goal is unlikely, as it is in the base: ten times as far, as in
+centimetres, it is still within half of the reach."""
 FAR = 20.0
 """Distance from which a length may have been meant in millimetres, in [m]."""
 
@@ -36,12 +41,11 @@ def hint_on_frame(robot: Robot, goal: FrameGoal) -> str:
     """The likely reason why no configuration meets a goal, as a clause; "" for none."""
     if goal.position is not None:
         position = np.asarray(goal.position)
-        in_metres = MILLIMETRE * position
-        away, reach = float(np.linalg.norm(position)), reach_of(robot)
-        if away > max(FAR, 2 * reach) and np.linalg.norm(in_metres) <= 2 * reach:
+        unit, metres = _likely_unit(float(np.linalg.norm(position)), reach_of(robot))
+        if unit:
             return (
-                f"its position {_shown(position)} m looks like millimetres, which are "
-                f"{_shown(in_metres)} m"
+                f"its position {_shown(position)} m looks like {unit}, which are "
+                f"{_shown(metres * position)} m"
             )
     joints = int(moves_frame(robot.model, goal.frame).sum())
     if goal.equations > joints:
@@ -51,6 +55,20 @@ def hint_on_frame(robot: Robot, goal: FrameGoal) -> str:
             "position or an axis alone, or leave the goal's joints to a State"
         )
     return ""
+
+
+def _likely_unit(away: float, reach: float) -> tuple[str, float]:
+    """The unit in which a position was probably meant, and its length in [m]; "" if in metres.
+
+    away, reach: distances from the world's origin, of the position in its unit and of joints.
+    """
+    if away <= max(FAR, 2 * reach):
+        return "", 1.0
+    if MILLIMETRE * away < NEAR_BASE * reach:
+        return "centimetres", CENTIMETRE
+    if MILLIMETRE * away <= 2 * reach:
+        return "millimetres", MILLIMETRE
+    return "", 1.0
 
 
 def _shown(values: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> str:
