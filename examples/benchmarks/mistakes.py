@@ -42,7 +42,7 @@ MISTAKES: dict[str, tuple[dict[str, Any], str]] = {
     "too little time for a joint": ({"duration": 0.2}, "which takes 0.381 s"),
     "too little time for a frame": (
         {"duration": 0.2, "goal": HAND | {"position": [-0.45, -0.25, 0.25]}},
-        "cannot be at the goal within 0.2 s",
+        "cannot move from the start to the goal within 0.2 s",
     ),
     "too little time for a segment": (
         {"segments": [REACH, {"name": "back", "duration": 0.2, "goal": {"q": Q0}}]},

@@ -50,14 +50,32 @@ def test_a_much_shorter_duration_is_refused_from_both_ends(ur5: hovi.Robot) -> N
     limits = as_limits(ur5, "urdf")
     q0, q1 = np.array([0.0, -1.2, 1.2, -0.5, 0.3, 0.1]), np.array([1.8, -1.0, 0.3, 0.5, 0.3, 0.1])
     frames = [hovi.FrameGoal("tool0", ur5.frame_pose("tool0", q)) for q in (q0, q1)]
-    for start, goal, name in (
-        (hovi.State(q0), frames[1], "goal"),
-        (frames[0], hovi.State(q1), "start"),
-    ):
+    for start, goal in ((hovi.State(q0), frames[1]), (frames[0], hovi.State(q1))):
         finding = found(ur5, start, goal, 0.15, limits)
         assert finding is not None
         assert finding.certain
-        assert f"frame 'tool0' cannot be at the {name} within 0.15 s" in finding.clause
+        assert (
+            "frame 'tool0' cannot move from the start to the goal within 0.15 s" in finding.clause
+        )
+        assert finding.clause.endswith("; increase the duration or the limits")
+
+
+def test_a_leg_to_or_from_a_via_point_is_named_once_by_its_two_ends(ur5: hovi.Robot) -> None:
+    limits = as_limits(ur5, "urdf")
+    q0, q1 = np.array([0.0, -1.2, 1.2, -0.5, 0.3, 0.1]), np.array([1.8, -1.0, 0.3, 0.5, 0.3, 0.1])
+    frame, via = hovi.FrameGoal("tool0", ur5.frame_pose("tool0", q0)), "via point at 0.1 s"
+    far = hovi.State(q1)
+    for first, last in (
+        (Stop("start", 0.0, far), Stop(via, 0.1, frame)),
+        (Stop("start", 0.0, frame), Stop(via, 0.1, far)),
+        (Stop(via, 0.1, far), Stop("goal", 0.2, frame)),
+        (Stop(via, 0.1, frame), Stop("goal", 0.2, far)),
+    ):
+        finding = frame_too_far(ur5, [first, last], limits)
+        assert finding is not None
+        ends = f"the {first.name} to the {last.name}"
+        assert f"frame 'tool0' cannot move from {ends} within 0.1 s: " in finding.clause
+        assert finding.clause.endswith("; increase the time or the limits")
 
 
 def test_what_is_not_proven_is_only_probable(ur5: hovi.Robot) -> None:

@@ -92,7 +92,11 @@ REFUSED: dict[str, tuple[dict[str, Any], tuple[str, ...]]] = {
     ),
     "too little time for a frame": (
         UR5 | {"duration": 0.2, "goal": HANDLE | {"position": [-0.45, -0.25, 0.25]}},
-        ("frame 'tool0' cannot be at the goal within 0.2 s", "takes 0.69", "velocity limits"),
+        (
+            "frame 'tool0' cannot move from the start to the goal within 0.2 s",
+            "takes 0.69",
+            "velocity limits",
+        ),
     ),
     "too little time to a via point": (
         UR5 | {"via": [{"time": "100 ms", "q": Q1}], "goal": {"q": Q0}},
@@ -134,7 +138,7 @@ REFUSED: dict[str, tuple[dict[str, Any], tuple[str, ...]]] = {
                 {"duration": 2.0, "goal": {"q": Q0}},
             ]
         },
-        ("in 'rush' frame 'tool0' cannot be at the goal within 0.2 s",),
+        ("in 'rush' frame 'tool0' cannot move from the start to the goal within 0.2 s",),
     ),
     "a goal of a segment in an obstacle": (
         LIFT

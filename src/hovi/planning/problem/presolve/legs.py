@@ -129,11 +129,6 @@ class _Leg:
         """Whether it is the whole motion."""
         return (self.first.name, self.last.name) == ("start", "goal")
 
-    @property
-    def between(self) -> str:
-        """The two stops in a sentence, unless they are both ends."""
-        return "" if self.whole else f" from the {self.first.name} to the {self.last.name}"
-
 
 def _between_states(leg: _Leg) -> str:
     """The joint that cannot travel its distance in time."""
@@ -150,9 +145,10 @@ def _between_states(leg: _Leg) -> str:
             most = leg.limits.upper[row, i] if distance[i] >= 0 else -leg.limits.lower[row, i]
             kinds.append((kind, f"{kind} limit of {most:.4g} {units[row]}"))
     what = "duration" if leg.whole else "time"
+    between = "" if leg.whole else f" from the {leg.first.name} to the {leg.last.name}"
     return (
         f"joint {on.coordinate_names[i]!r} has to move by {abs(distance[i]):.4g} {units.q}"
-        f"{leg.between}, which takes {needed[i]:.4g} s at its "
+        f"{between}, which takes {needed[i]:.4g} s at its "
         f"{' and '.join(text for _, text in kinds)}, longer than the {what} of {leg.time:.4g} s; "
         f"increase the {what} or the {' or '.join(kind for kind, _ in kinds)} limit"
     )
@@ -174,7 +170,7 @@ class _FrameLeg(_Leg):
         return self.last if self.known is self.first else self.first
 
     def finding(self) -> Finding | None:
-        """The frame that cannot be at its goal in time."""
+        """The frame that cannot move to its goal, or from it, in time."""
         robot = self.coordinates
         goal = self._other.goal
         assert isinstance(goal, FrameGoal)
@@ -191,14 +187,13 @@ class _FrameLeg(_Leg):
             return None
         needed = self._least_found(goal, q, longest)
         limits = "velocity and acceleration limits" if self._accelerated else "velocity limits"
-        where = f"{self._other.name}{self.between}"
         nearest = f"at the {limits} the nearest configuration found takes {needed:.3g} s"
-        advice = "increase the duration or the limits"
+        advice = f"increase the {'duration' if self.whole else 'time'} or the limits"
+        move = f"move from the {self.first.name} to the {self.last.name} within {self.time:.4g} s"
         if self._proven(goal, q):
-            what = f"frame {goal.frame!r} cannot be at the {where} within {self.time:.4g} s"
-            return Finding(f"{what}: {nearest}; {advice}", True)
-        what = f"frame {goal.frame!r} has to be at the {where} within {self.time:.4g} s"
-        return Finding(f"{what}, but {nearest}: probably no motion exists; {advice}", False)
+            return Finding(f"frame {goal.frame!r} cannot {move}: {nearest}; {advice}", True)
+        what = f"frame {goal.frame!r} has to {move}, but {nearest}: probably no motion exists"
+        return Finding(f"{what}; {advice}", False)
 
     @property
     def _accelerated(self) -> bool:
