@@ -62,6 +62,15 @@ def test_a_duration_is_one_number_or_two(given: Any) -> None:
         as_duration(given)
 
 
+@pytest.mark.parametrize("given", [[3, 1], (2.0, 2.0), ("3 s", "500 ms"), [1, "1000 ms"]])
+def test_the_lower_bound_of_a_free_duration_is_below_the_upper_one(given: Any) -> None:
+    with pytest.raises(InputError, match="whose lower bound is below the upper one, but it is \\["):
+        as_duration(given)
+    for bounds in ([-1, 2], [0, 2], [1, np.inf], [np.nan, 1]):
+        with pytest.raises(InputError, match=r"`duration` must be a positive number"):
+            as_duration(bounds)
+
+
 @pytest.mark.parametrize("text", ["1" + " " * 10**6 + "!", " " * 10**6, "1" * 10**6, "." * 10**6])
 def test_a_long_text_is_read_in_linear_time(text: str) -> None:
     number_and_unit(text)  # in quadratic time this would not return for hours

@@ -77,15 +77,24 @@ def _as_double(number: float, what: str) -> float:
 def as_duration(given: Any) -> float | tuple[float, float]:
     """A duration in [s], or (lower, upper) bounds of a free one.
 
-    Raises InputError for what is neither, not positive, not finite, or falls.
+    Raises InputError for what is neither, not positive or not finite, and for a lower bound that is
+    not below the upper one.
     """
     if isinstance(given, str) or is_number(given):
         ends: tuple[float, ...] = (seconds(given, "the duration"),)
     else:
         ends = _bounds(given)
-    if not all(math.isfinite(each) and each > 0 for each in ends) or ends != tuple(sorted(ends)):
+    if not all(math.isfinite(each) and each > 0 for each in ends):
         raise _no_duration(given)
-    return (ends[0], ends[1]) if len(ends) == 2 else ends[0]
+    if len(ends) == 1:
+        return ends[0]
+    lower, upper = ends
+    if lower >= upper:
+        raise InputError(
+            "`duration` must be a list [lower, upper] whose lower bound is below the upper one, "
+            f"but it is {_as_given(given)}."
+        )
+    return lower, upper
 
 
 def _bounds(given: Any) -> tuple[float, float]:
@@ -97,6 +106,9 @@ def _bounds(given: Any) -> tuple[float, float]:
 
 
 def _no_duration(given: Any) -> InputError:
+    return InputError(f"`duration` must be {DURATION_IN_WORDS}, but it is {_as_given(given)}.")
+
+
+def _as_given(given: Any) -> str:
     pair = isinstance(given, list | tuple) and len(given) == 2
-    came = f"[{', '.join(map(shown, given))}]" if pair else shown(given)
-    return InputError(f"`duration` must be {DURATION_IN_WORDS}, but it is {came}.")
+    return f"[{', '.join(map(shown, given))}]" if pair else shown(given)
