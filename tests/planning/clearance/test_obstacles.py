@@ -8,9 +8,18 @@ import math
 import numpy as np
 import pytest
 
+import hovi
 from hovi.errors import InputError
 from hovi.planning.clearance.clearance import Clearance
-from hovi.planning.clearance.obstacles import Box, Capsule, Obstacle, Sphere, obstacle_from_dict
+from hovi.planning.clearance.obstacles import (
+    KINDS,
+    Box,
+    Capsule,
+    Obstacle,
+    Sphere,
+    obstacle_from_dict,
+)
+from hovi.planning.obstacles.obstacle import SYNONYMS
 
 ALL = [
     Sphere([0.1, 0.2, 0.3], 0.1, name="ball"),
@@ -63,6 +72,21 @@ def test_a_box_is_turned_as_in_a_urdf() -> None:
 def test_an_invalid_obstacle_is_refused_in_one_sentence(make: object, words: str) -> None:
     with pytest.raises(InputError, match=words):
         make()  # type: ignore[operator]
+
+
+@pytest.mark.parametrize("word", SYNONYMS)
+def test_another_word_for_a_kind_leads_to_that_kind_alone(word: str) -> None:
+    meant = SYNONYMS[word]
+    assert meant in KINDS
+    for each in (word, word.capitalize()):
+        with pytest.raises(InputError, match=f"of kind '{each}': did you mean '{meant}'\\?$"):
+            obstacle_from_dict({"kind": each})
+
+
+def test_another_word_leads_to_no_shape_that_a_grasped_object_cannot_have() -> None:
+    for word, hint in (("cuboid", r"did you mean 'box'\?$"), ("floor", "valid names are 'box', ")):
+        with pytest.raises(InputError, match=f"of kind '{word}': {hint}"):
+            hovi.Grasped({"kind": word}, "tip", 1.0)
 
 
 def test_obstacles_without_names_are_numbered_and_come_back_from_json() -> None:

@@ -28,6 +28,18 @@ GRASPED_KEYS = {
     "shape": "a table such as an obstacle's, or a list of them",
 }
 """What a table of a grasped object must have, and what that is."""
+SYNONYMS = {
+    "cube": "box",
+    "cuboid": "box",
+    "brick": "box",
+    "ball": "sphere",
+    "rod": "cylinder",
+    "tube": "cylinder",
+    "plane": "half_space",
+    "floor": "half_space",
+    "ground": "half_space",
+}
+"""Kinds of obstacles by other words for them, for messages."""
 
 
 class Body(NamedTuple):
@@ -128,8 +140,9 @@ def obstacle_of_kind(
     """
     kind = table.get("kind")
     if not isinstance(kind, str) or kind not in kinds:
+        likely = SYNONYMS.get(str(kind).lower(), str(kind))
         raise InputError(
-            f"there is no obstacle of kind {kind!r}: {nearest(str(kind), [*kinds, *others])}"
+            f"there is no obstacle of kind {kind!r}: {nearest(likely, [*kinds, *others])}"
         )
     words = kind.replace("_", " ")
     known = {each.name: each.default is MISSING for each in fields(kinds[kind])}
