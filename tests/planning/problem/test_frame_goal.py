@@ -132,6 +132,11 @@ def test_bad_goals_are_refused_in_one_sentence(ur5: Robot) -> None:
         ({"pose": np.eye(4), "position": [0, 0, 0]}, "not both"),
         ({"rotation": np.eye(3), "axis": ([0, 0, 1], [0, 0, 1])}, "not both"),
         ({"pose": np.eye(3)}, r"\(4, 4\)"),
+        (
+            {"position": [0, 0, 0], "quaternion": [1, 0, 0, 0]},
+            "has no `quaternion`: did you mean 'quaternion_xyzw' or 'quaternion_wxyz'",
+        ),
+        ({"positon": [0, 0, 0]}, "has no `positon`: did you mean 'position'"),
     ):
         with pytest.raises(InputError, match=sentence):
             FrameGoal("tool0", **arguments)

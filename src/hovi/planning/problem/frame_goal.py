@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import field
+from dataclasses import field, fields
 from functools import cached_property, lru_cache
-from typing import Any
+from typing import Any, TypeVar
 
 import casadi as ca
 import numpy as np
@@ -18,7 +19,7 @@ from hovi.checks.directions import unit_vector
 from hovi.checks.shapes import numbers_of
 from hovi.dynamics.point_function import PointFunction
 from hovi.dynamics.symbolic_dynamics import casadi_functions
-from hovi.errors import InputError
+from hovi.errors import InputError, nearest
 from hovi.planning.problem.kinematics.orientation import ORIENTATIONS, rotation_from
 from hovi.planning.problem.node_conditions import Condition
 from hovi.robot.robot import Robot
@@ -26,6 +27,7 @@ from hovi.robot.space.tangent import Symbols, hessian, jacobian
 from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
+Owner = TypeVar("Owner")
 
 KEPT = 8
 """Number of configurations at which the equations of a frame goal are kept."""
@@ -37,6 +39,23 @@ ORTHONORMALITY_TOLERANCE = 1e-6
 """Largest deviation of a rotation matrix from orthonormality, and smallest length of an axis."""
 
 
+def _check_names(owner: type[Owner]) -> type[Owner]:
+    """A decorator: names that no argument of a frame goal has raise InputError."""
+    initialize: Callable[..., None] = vars(owner)["__init__"]
+    names = {each.name for each in fields(owner)}  # type: ignore[arg-type]
+
+    @functools.wraps(initialize)
+    def initialized(*args: Any, **given: Any) -> None:
+        for name in given:
+            if name not in names:
+                raise InputError(f"a frame goal has no `{name}`: {nearest(name, names)}")
+        initialize(*args, **given)
+
+    setattr(owner, "__init__", initialized)  # noqa: B010 - type checkers know no such assignment
+    return owner
+
+
+@_check_names
 @check_arguments
 @dataclass(frozen=True, eq=False)
 class FrameGoal:
@@ -54,8 +73,8 @@ class FrameGoal:
         rest.
     guess: configuration (nq,) from which inverse kinematics starts.
     Whatever was given, `position`, `rotation` and `axis` hold the goal.
-    Raises InputError for a matrix that is no rotation, an axis or a quaternion without length, or
-    an empty goal.
+    Raises InputError for a matrix that is no rotation, an axis or a quaternion without length, an
+    argument of another name, or an empty goal.
     """
 
     frame: str
