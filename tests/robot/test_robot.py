@@ -409,12 +409,22 @@ def test_a_quaternion_or_angle_without_unit_norm_is_refused() -> None:
         assert robot.check_configuration(nearly, "goal") == pytest.approx(q, abs=1e-15)
 
 
-@pytest.mark.parametrize("shape", [(), (2,), (1, 3), (1, 1, 2)])
-def test_frame_positions_need_rows_of_configurations(
-    two_link: Robot, shape: tuple[int, ...]
-) -> None:
-    with pytest.raises(InputError, match=re.escape(f"rows of shape (M, 2), got shape {shape}")):
+@pytest.mark.parametrize("shape", [(), (3,), (1, 3), (2, 1)])
+def test_frame_positions_need_configurations(two_link: Robot, shape: tuple[int, ...]) -> None:
+    with pytest.raises(InputError, match=re.escape(f"q must have shape (..., 2), got {shape}")):
         two_link.frame_position("tip", np.zeros(shape))
+
+
+@pytest.mark.parametrize("lead", [(), (1,), (4,), (3, 2), (0,), (2, 0)])
+def test_frame_positions_are_those_of_the_poses_at_one_or_many_configurations(
+    panda: Robot, lead: tuple[int, ...]
+) -> None:
+    q = np.random.default_rng(0).uniform(-1.0, 1.0, (*lead, panda.nq))
+    frames = ("panda_hand_tcp", "panda_link4")
+    poses = [panda.frame_pose(frame, q)[..., :3, 3] for frame in frames]
+    np.testing.assert_array_equal(panda.frame_positions(frames, q), np.stack(poses, axis=-2))
+    for frame, position in zip(frames, poses, strict=True):
+        np.testing.assert_array_equal(panda.frame_position(frame, q), position)
 
 
 @pytest.mark.parametrize("key", ["mimic", "free_flyer"])

@@ -315,11 +315,14 @@ class Robot(Coordinates):
         return self.space.difference(q0, q1)
 
     def frame_position(self, frame: str, q: Array) -> Array:
-        """Position of a frame's origin in the world frame, in [m]: q (M, nq) -> (M, 3)."""
-        return self.frame_positions((frame,), q)[:, 0]
+        """Position of a frame's origin in the world, in [m]: q (..., nq) -> (..., 3).
+
+        Raises InputError for an unknown frame or another shape.
+        """
+        return self.frame_positions((frame,), q)[..., 0, :]
 
     def frame_positions(self, frames: Sequence[str], q: Array) -> Array:
-        """Positions of the origins of F frames in the world, in [m]: q (M, nq) -> (M, F, 3)."""
+        """Positions of the origins of F frames in the world, in [m]: q (..., nq) -> (..., F, 3)."""
         for frame in frames:
             self._check_frame(frame)
         indices = [robot_model.frame_id(self.model, frame) for frame in frames]

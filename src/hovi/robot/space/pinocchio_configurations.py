@@ -31,23 +31,19 @@ def difference(model: pin.Model, q0: Array, q1: Array) -> Array:
 
 
 def frame_positions(model: pin.Model, frames: Sequence[int], q: Array) -> Array:
-    """Origins of F frames in the world, in [m]: q (M, nq) -> (M, F, 3).
+    """Origins of F frames in the world, in [m]: q (..., nq) -> (..., F, 3).
 
     Raises InputError for another shape.
     """
-    if np.shape(q)[1:] != (model.nq,):
-        raise InputError(
-            f"configurations are rows of shape (M, {model.nq}), got shape {np.shape(q)}: a single "
-            "one is q[None]."
-        )
     q = np.asarray(q, dtype=float)
-    data = model.createData()
-    positions = np.empty((len(q), len(frames), 3))
-    for places, one in zip(positions, q, strict=True):
+    require_rows((("q", q, model.nq),))
+    data, rows = model.createData(), q.reshape(int(np.prod(q.shape[:-1])), model.nq)
+    positions = np.empty((len(rows), len(frames), 3))
+    for places, one in zip(positions, rows, strict=True):
         pin.forwardKinematics(model, data, one)
         for place, frame in zip(places, frames, strict=True):
             place[:] = pin.updateFramePlacement(model, data, frame).translation
-    return positions
+    return positions.reshape(*q.shape[:-1], len(frames), 3)
 
 
 def frame_poses(model: pin.Model, frame: int, q: Array) -> Array:
