@@ -140,6 +140,22 @@ def test_the_schema_refuses_what_the_code_refuses(wrong: dict[str, Any]) -> None
     assert not valid(data | wrong, SCHEMA)
 
 
+@pytest.mark.parametrize(
+    "short",
+    [
+        {"goal": [0.1, 0.2]},
+        {"start": {"panda_joint1": 0.1}},
+        {"start": "default"},
+        {"obstacles": {"kind": "sphere"}},
+        {"grasped": {"frame": "panda_hand", "mass": 1.0, "shape": {"kind": "sphere"}}},
+    ],
+    ids=str,
+)
+def test_the_schema_takes_values_by_themselves(short: dict[str, Any]) -> None:
+    data = tomllib.loads((MODELS / "panda_reach.toml").read_text())
+    assert valid(data | short, SCHEMA)
+
+
 def test_every_key_is_described_and_defaults_are_the_effects_own() -> None:
     for name, table in SCHEMA["properties"].items():
         assert table.get("description"), name

@@ -12,8 +12,19 @@ from pydantic import Field, create_model
 
 from hovi.effects import REGISTRY
 from hovi.planning.task_file.effect_tables import effect_schema
-from hovi.planning.task_file.schema import LimitsName, LimitsTable, SegmentTable, Table, TaskTable
+from hovi.planning.task_file.schema import (
+    Bare,
+    GoalTable,
+    GraspedTable,
+    LimitsName,
+    LimitsTable,
+    SegmentTable,
+    StartTable,
+    Table,
+    TaskTable,
+)
 
+_Entries = dict[str, Any]
 _NO_DEFAULT = ("default", None)
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
@@ -29,6 +40,7 @@ def json_schema() -> dict[str, Any]:
     own: dict[str, Any] = {
         "effects": (simulated, Field(default=None, description="tables of effects")),
         "limits": (limits | None, SegmentTable.model_fields["limits"]),
+        "goal": (GoalTable | Bare | None, SegmentTable.model_fields["goal"]),
     }
     segment = create_model("Segment", __base__=SegmentTable, __doc__="[[segments]].", **own)
     keys: dict[str, Any] = {
@@ -38,6 +50,10 @@ def json_schema() -> dict[str, Any]:
         ),
         "segments": (list[segment], TaskTable.model_fields["segments"]),  # type: ignore[valid-type]
         "limits": (limits, Field(default="urdf", description="what bounds the motion")),
+        "start": (StartTable | Bare, TaskTable.model_fields["start"]),
+        "goal": (GoalTable | Bare | None, TaskTable.model_fields["goal"]),
+        "obstacles": (list[_Entries] | _Entries, TaskTable.model_fields["obstacles"]),
+        "grasped": (list[GraspedTable] | GraspedTable, TaskTable.model_fields["grasped"]),
         "tolerance": (
             float | str | None,
             Field(default=None, description=TaskTable.model_fields["tolerance"].description),

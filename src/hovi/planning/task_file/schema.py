@@ -8,7 +8,16 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Discriminator, Field, FiniteFloat, Tag, create_model
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Discriminator,
+    Field,
+    FiniteFloat,
+    Tag,
+    create_model,
+)
 
 from hovi.planning.obstacles.obstacle import GRASPED_KEYS
 from hovi.planning.problem.arms.limit_set import LimitSetName
@@ -138,6 +147,29 @@ class GoalTable(EndTable):
     )
 
 
+def _with_q(given: Any) -> Any:
+    """The table of an end from a configuration that is given by itself, as Python takes it."""
+    if isinstance(given, str | list):
+        return {"q": given}
+    by_joint = isinstance(given, dict) and given and not given.keys() & GoalTable.model_fields
+    return {"q": given} if by_joint else given
+
+
+def _listed(given: Any) -> Any:
+    """A list of one table that is given by itself."""
+    return [given] if isinstance(given, dict) else given
+
+
+Start = Annotated[StartTable, BeforeValidator(_with_q)]
+Goal = Annotated[GoalTable | None, BeforeValidator(_with_q)]
+Bare = list[FiniteFloat] | dict[str, FiniteFloat | list[FiniteFloat]] | str
+"""A configuration by itself in place of the table of an end."""
+_END = (
+    "a list of finite numbers, a table of joint names, the name of a pose, or a table {} with q "
+    "and, if moving, v, or with a frame and its target"
+)
+
+
 class ViaTable(GoalTable):
     """[[via]]."""
 
@@ -149,10 +181,7 @@ class SegmentTable(Table):
 
     name: str = Field(default="", description="a text")
     duration: PositiveSeconds = Field(description=SECONDS_IN_WORDS)
-    goal: GoalTable | None = Field(
-        default=None,
-        description="a table with q and, if moving, v, or with a frame and its target",
-    )
+    goal: Goal = Field(default=None, description=_END.format("[segments.goal]"))
     limits: Any = Field(
         default=None, description='"urdf", "none", the name of an arm or a table of limits'
     )
@@ -237,17 +266,15 @@ class ShapedTable(Table):
     limits: Any = Field(
         default="urdf", description='"urdf", "none", the name of an arm or a table [limits]'
     )
-    obstacles: list[dict[str, Any]] = Field(default=[], description="tables [[obstacles]]")
-    grasped: list[GraspedTable] = Field(
-        default=[], description="tables [[grasped]] with frame, mass and shape"
+    obstacles: Annotated[list[dict[str, Any]], BeforeValidator(_listed)] = Field(
+        default=[], description="tables [[obstacles]], or one table [obstacles]"
     )
-    start: StartTable = Field(
-        description="a table [start] with q and, if moving, v, or with a frame and its target"
+    grasped: Annotated[list[GraspedTable], BeforeValidator(_listed)] = Field(
+        default=[],
+        description="tables [[grasped]], or one table [grasped], with frame, mass and shape",
     )
-    goal: GoalTable | None = Field(
-        default=None,
-        description="a table [goal] with q and, if moving, v, or with a frame and its target",
-    )
+    start: Start = Field(description=_END.format("[start]"))
+    goal: Goal = Field(default=None, description=_END.format("[goal]"))
     segments: list[SegmentTable] = Field(
         default=[], description="tables [[segments]] with a duration and a goal each"
     )
