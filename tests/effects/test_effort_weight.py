@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -45,14 +46,14 @@ def test_a_robot_without_limits_is_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("effect", "count"),
+    ("sources", "count"),
     [
-        (EffortWeight(), "none was"),
-        (EffortWeight(1.0, from_urdf=True), "two were"),
-        (EffortWeight(1.0, ((1.0, 0.0), (0.0, 1.0)), from_urdf=True), "all were"),
+        ({}, "none was"),
+        ({"weight": 1.0, "from_urdf": True}, "two were"),
+        ({"weight": 1.0, "matrix": ((1.0, 0.0), (0.0, 1.0)), "from_urdf": True}, "all were"),
     ],
 )
-def test_one_source_is_needed(effect: EffortWeight, count: str, two_link: hovi.Robot) -> None:
+def test_one_source_is_needed(sources: dict[str, Any], count: str) -> None:
     sentence = f"needs one of weight, matrix and from_urdf = true; {count} given"
     with pytest.raises(SceneError, match=sentence):
-        hovi.Scene(two_link, [effect])
+        EffortWeight(**sources)

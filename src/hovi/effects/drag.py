@@ -40,16 +40,21 @@ class Drag(Effect):
     key: ClassVar[str] = "drag"
 
     def check(self, robot: Robot) -> None:
-        """Raise SceneError for an unknown frame and negative values."""
+        """Raise SceneError for an unknown frame."""
         require_frame(robot, self.key, self.frame)
+
+    def check_values(self) -> None:
+        """Raise SceneError for negative values, and for invalid components of the wind."""
         for name in ("area", "density", "linear"):
             value = getattr(self, name)
             if not 0 <= value < np.inf:
                 raise SceneError(
-                    f"effect 'drag': {name} must be finite and 0 or more, got {value}."
+                    f"effect 'drag': {name} must be finite and 0 or more, got {value:g}."
                 )
         if not 0 < self.width < np.inf:
-            raise SceneError(f"effect 'drag': width must be positive and finite, got {self.width}.")
+            raise SceneError(
+                f"effect 'drag': width must be positive and finite, got {self.width:g}."
+            )
         time_vector("effect 'drag': wind", self.wind, ca.SX.sym("t"))
 
     def torque(self, robot: Robot, symbols: SceneSymbols) -> ca.SX:

@@ -45,14 +45,17 @@ class DryFriction(Effect):
     from_urdf: bool = False
     key: ClassVar[str] = "dry_friction"
 
-    def check(self, robot: Robot) -> None:
-        """Raise SceneError for negative friction, F_s < F_c, and widths that are not positive."""
+    def check_values(self) -> None:
+        """Raise SceneError for widths that are not positive."""
         for name in ("stribeck_velocity", "width"):
             value = getattr(self, name)
             if not 0 < value < np.inf:
                 raise SceneError(
-                    f"effect 'dry_friction': {name} must be positive and finite, got {value}."
+                    f"effect 'dry_friction': {name} must be positive and finite, got {value:g}."
                 )
+
+    def check(self, robot: Robot) -> None:
+        """Raise SceneError for negative friction, and F_s < F_c."""
         coulomb, static = self.values(robot)
         below = np.flatnonzero(static < coulomb)
         if len(below):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import fields
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -50,11 +50,15 @@ class Effect(ABC):
     def __post_init__(self) -> None:
         """Convert lists to tuples, so that effects read from a file equal those written.
 
-        Raises SceneError for a field of another type than its annotation.
+        Raises SceneError for a field of another type than its annotation, and as `check_values`.
         """
         check_fields(self, f"effect {self.key!r}", SceneError)
         for field in fields(self):
             object.__setattr__(self, field.name, _frozen(getattr(self, field.name)))
+        self.check_values()
+
+    def check_values(self) -> None:
+        """Raise SceneError for values that are invalid for every robot."""
 
     def check(self, robot: Robot) -> None:
         """Raise SceneError if the effect is not valid for the robot."""
@@ -93,6 +97,11 @@ class Effect(ABC):
     @abstractmethod
     def describe(self) -> str:
         """One line: the effect and its parameters with units."""
+
+
+def bracketed(numbers: Iterable[float]) -> str:
+    """Numbers in a message, whether they were given as integers or not."""
+    return f"[{', '.join(f'{x:g}' for x in numbers)}]"
 
 
 def _frozen(value: Any) -> Any:

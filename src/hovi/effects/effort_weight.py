@@ -52,8 +52,8 @@ class EffortWeight(Effect):
     key: ClassVar[str] = "effort_weight"
     touches: ClassVar[tuple[Touch, ...]] = (Touch.COST,)
 
-    def check(self, robot: Robot) -> None:
-        """Raise SceneError for unknown joints, negative weights and what is no such matrix."""
+    def check_values(self) -> None:
+        """Raise SceneError unless one kind of weight is given."""
         sources = [self.weight is not None, self.matrix is not None, self.from_urdf]
         if sum(sources) != 1:
             count = {0: "none was", 2: "two were"}.get(sum(sources), "all were")
@@ -61,6 +61,9 @@ class EffortWeight(Effect):
                 "effect 'effort_weight' needs one of weight, matrix and from_urdf = true; "
                 f"{count} given."
             )
+
+    def check(self, robot: Robot) -> None:
+        """Raise SceneError for unknown joints, negative weights and what is no such matrix."""
         self.effort_weight(robot)
         self._check_matrix(robot)
 

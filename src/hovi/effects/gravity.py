@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from hovi.checks.directions import unit_vector
-from hovi.effects.effect import Effect, Touch
+from hovi.effects.effect import Effect, Touch, bracketed
 from hovi.errors import SceneError
 from hovi.system.dataclass import dataclass
 
@@ -30,23 +30,23 @@ class Gravity(Effect):
     key: ClassVar[str] = "gravity"
     touches: ClassVar[tuple[Touch, ...]] = (Touch.MODEL,)
 
-    def check(self, robot: Robot) -> None:
+    def check_values(self) -> None:
         """Raise SceneError for a negative or infinite acceleration, and an invalid direction."""
         if not np.isfinite(self.acceleration):
             raise SceneError(
-                f"effect 'gravity': acceleration must be finite, got {self.acceleration}; "
+                f"effect 'gravity': acceleration must be finite, got {self.acceleration:g}; "
                 "leave the effect out for a scene without gravity."
             )
         if self.acceleration < 0:
             raise SceneError(
-                f"effect 'gravity': acceleration must be 0 or more, got {self.acceleration} m/s^2, "
-                "which pulls upwards; set the `direction` instead, (0, 0, -1) by default."
+                f"effect 'gravity': acceleration must be 0 or more, got {self.acceleration:g} "
+                "m/s^2, which pulls upwards; set the `direction` instead, (0, 0, -1) by default."
             )
         finite = len(self.direction) == 3 and np.isfinite(self.direction).all()
         if not finite or not any(self.direction):
             raise SceneError(
                 f"effect 'gravity': direction must be three finite numbers that are not all zero, "
-                f"got {list(self.direction)}."
+                f"got {bracketed(self.direction)}."
             )
 
     def configure(self, model: pin.Model, robot: Robot) -> None:

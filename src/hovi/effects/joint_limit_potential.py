@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, ClassVar
 import casadi as ca
 import numpy as np
 
-from hovi.effects.effect import Effect, Touch
+from hovi.effects.effect import Effect, Touch, bracketed
 from hovi.effects.expressions.symbols import SceneSymbols
 from hovi.errors import SceneError, nearest
 from hovi.system.dataclass import dataclass
@@ -40,13 +40,13 @@ class JointLimitPotential(Effect):
     key: ClassVar[str] = "joint_limit_potential"
     touches: ClassVar[tuple[Touch, ...]] = (Touch.COST, Touch.TORQUE)
 
-    def check(self, robot: Robot) -> None:
-        """Raise SceneError for unknown joints, empty ranges, and invalid slopes and widths."""
+    def check_values(self) -> None:
+        """Raise SceneError for empty ranges, and invalid slopes and widths."""
         for name, value in (("slope", self.slope), ("width", self.width)):
             if not (np.isfinite(value) and value > 0):
                 raise SceneError(
                     f"effect 'joint_limit_potential': {name} must be positive and finite, "
-                    f"got {value}."
+                    f"got {value:g}."
                 )
         for joint, bounds in self.ranges.items():
             if len(bounds) != 2:
@@ -54,16 +54,19 @@ class JointLimitPotential(Effect):
                     f"effect 'joint_limit_potential': the range of {joint!r} must be two numbers, "
                     f"got {len(bounds)}."
                 )
-            lower, upper = bounds
+            if not bounds[0] < bounds[1]:
+                raise SceneError(
+                    f"effect 'joint_limit_potential': the range of {joint!r} must rise, "
+                    f"got {bracketed(bounds)}."
+                )
+
+    def check(self, robot: Robot) -> None:
+        """Raise SceneError for unknown joints."""
+        for joint in self.ranges:
             if joint not in _simple_joints(robot):
                 raise SceneError(
                     f"effect 'joint_limit_potential': robot {robot.name!r} has no joint "
                     f"{joint!r} with one coordinate: {nearest(joint, _simple_joints(robot))}"
-                )
-            if not lower < upper:
-                raise SceneError(
-                    f"effect 'joint_limit_potential': the range of {joint!r} must rise, "
-                    f"got [{lower}, {upper}]."
                 )
 
     def potential(self, robot: Robot, symbols: SceneSymbols) -> ca.SX:

@@ -33,10 +33,13 @@ class MovingBase(Effect):
     rotation: TimeVector = (0.0, 0.0, 0.0)
     key: ClassVar[str] = "moving_base"
 
-    def check(self, robot: Robot) -> None:
-        """Raise SceneError for invalid components, and for a floating base."""
+    def check_values(self) -> None:
+        """Raise SceneError for invalid components."""
         for name in ("position", "rotation"):
             time_vector(f"effect 'moving_base': {name}", getattr(self, name), ca.SX.sym("t"))
+
+    def check(self, robot: Robot) -> None:
+        """Raise SceneError for a floating base."""
         for name, joint in list(zip(robot.model.names, robot.model.joints, strict=True))[1:]:
             if kind_of(joint) is FLOATING:
                 raise SceneError(

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 import pinocchio as pin
 
-from hovi.effects.effect import Effect, Touch
+from hovi.effects.effect import Effect, Touch, bracketed
 from hovi.effects.expressions.frame_motion import require_frame
 from hovi.errors import SceneError
 from hovi.system.dataclass import dataclass
@@ -36,20 +36,24 @@ class Payload(Effect):
     touches: ClassVar[tuple[Touch, ...]] = (Touch.MODEL,)
 
     def check(self, robot: Robot) -> None:
-        """Raise SceneError for an unknown or fixed frame, and for an invalid inertia."""
+        """Raise SceneError for an unknown or fixed frame."""
         require_frame(robot, self.key, self.frame)
         if robot.model.frames[robot.model.getFrameId(self.frame)].parentJoint == 0:
             raise SceneError(
                 f"effect 'payload': frame {self.frame!r} is fixed to the base, where a payload "
                 "changes nothing; name a frame that a joint moves."
             )
+
+    def check_values(self) -> None:
+        """Raise SceneError for an invalid mass, center or inertia."""
         if not 0 <= self.mass < np.inf:
             raise SceneError(
-                f"effect 'payload': mass must be finite and 0 or more, got {self.mass} kg."
+                f"effect 'payload': mass must be finite and 0 or more, got {self.mass:g} kg."
             )
         if len(self.center) != 3 or not np.isfinite(self.center).all():
             raise SceneError(
-                f"effect 'payload': center must be three finite numbers, got {list(self.center)}."
+                f"effect 'payload': center must be three finite numbers, got "
+                f"{bracketed(self.center)}."
             )
         if len(self.inertia) != 6:
             raise SceneError(
@@ -60,7 +64,7 @@ class Payload(Effect):
         if not np.isfinite(tensor).all() or np.linalg.eigvalsh(tensor)[0] < -1e-12 * tensor.max():
             raise SceneError(
                 "effect 'payload': inertia (Ixx, Iyy, Izz, Ixy, Ixz, Iyz) must be finite and must "
-                f"not have a negative principal value, got {list(self.inertia)}."
+                f"not have a negative principal value, got {bracketed(self.inertia)}."
             )
 
     def configure(self, model: pin.Model, robot: Robot) -> None:

@@ -32,11 +32,14 @@ class PowerCost(Effect):
     touches: ClassVar[tuple[Touch, ...]] = (Touch.COST,)
 
     def check(self, robot: Robot) -> None:
-        """Raise SceneError for unknown joints, negative weights and a nonpositive width."""
+        """Raise SceneError for unknown joints and negative weights."""
         joint_values(robot, "effect 'power_cost': weight", self.weight, 0)
+
+    def check_values(self) -> None:
+        """Raise SceneError for a nonpositive width."""
         if not 0 < self.width < np.inf:
             raise SceneError(
-                f"effect 'power_cost': width must be positive and finite, got {self.width} W."
+                f"effect 'power_cost': width must be positive and finite, got {self.width:g} W."
             )
 
     def running_cost(self, robot: Robot, symbols: SceneSymbols, tau: ca.SX) -> ca.SX:

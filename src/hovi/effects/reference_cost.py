@@ -32,12 +32,16 @@ class ReferenceCost(Effect):
     key: ClassVar[str] = "reference_cost"
     touches: ClassVar[tuple[Touch, ...]] = (Touch.COST,)
 
-    def check(self, robot: Robot) -> None:
-        """Raise SceneError for unknown joints, invalid formulas and a negative weight."""
+    def check_values(self) -> None:
+        """Raise SceneError for a negative weight."""
         if not 0 <= self.weight < np.inf:
             raise SceneError(
-                f"effect 'reference_cost': weight must be finite and 0 or more, got {self.weight}."
+                f"effect 'reference_cost': weight must be finite and 0 or more, got "
+                f"{self.weight:g}."
             )
+
+    def check(self, robot: Robot) -> None:
+        """Raise SceneError for unknown joints and invalid formulas."""
         names = robot.coordinate_names
         for joint in self.reference:
             if joint not in names:

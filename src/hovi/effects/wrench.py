@@ -35,8 +35,11 @@ class Wrench(Effect):
     key: ClassVar[str] = "wrench"
 
     def check(self, robot: Robot) -> None:
-        """Raise SceneError for an unknown frame or axes, and for invalid components."""
+        """Raise SceneError for an unknown frame."""
         require_frame(robot, self.key, self.frame)
+
+    def check_values(self) -> None:
+        """Raise SceneError for unknown axes, and for invalid components."""
         if self.axes not in AXES:
             raise SceneError(f"effect 'wrench': axes {self.axes!r}: {nearest(self.axes, AXES)}")
         for name in ("force", "moment"):

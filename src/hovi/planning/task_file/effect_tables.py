@@ -65,8 +65,8 @@ def _read_effect(keys: Keys, table: Mapping[str, Any], robot: Robot, toml: TomlT
     except ValidationError as invalid:
         raise first_sentence(invalid, schema, toml, above=keys) from None
     given = {key: getattr(checked, key) for key in table}
-    effect = REGISTRY[name](**given)
     try:
+        effect = REGISTRY[name](**given)
         effect.check(robot)
     except SceneError as refused:
         raise toml.error(keys, str(refused)) from None

@@ -158,7 +158,7 @@ REFUSED: dict[str, tuple[dict[str, Any], tuple[str, ...]]] = {
 WRONG: dict[str, tuple[dict[str, Any], tuple[str, ...]]] = {
     "a negative mass": (
         UR5 | {"effects": GRAVITY | {"payload": {"frame": "tool0", "mass": -2.0}}},
-        ("effect 'payload': mass must be finite and 0 or more, got -2.0 kg.",),
+        ("effect 'payload': mass must be finite and 0 or more, got -2 kg.",),
     ),
     "a negative duration": (UR5 | {"duration": -1}, ("`duration` must be a positive number",)),
     "a falling pair of durations": (
