@@ -378,9 +378,10 @@ def _passive(robot: Robot, names: Sequence[str]) -> tuple[str, ...]:
     names = _passive_names(names)
     for name in names:
         if name not in robot.joint_names:
-            raise SceneError(
-                f"passive: robot {robot.name!r} has no joint {name!r}: {robot.hint(str(name))}"
-            )
+            hint = robot.hint(str(name))
+            if name == "root_joint":
+                hint = "its base is fixed; with `free_flyer` true it floats."
+            raise SceneError(f"passive: robot {robot.name!r} has no joint {name!r}: {hint}")
     chosen = tuple(name for name in robot.joint_names if name in names)
     if chosen and len(chosen) == len(robot.joint_names):
         raise SceneError("every joint is passive; a motion needs at least one actuated joint.")

@@ -256,7 +256,9 @@ class ShapedTable(Table):
         default=[], description="a list of folders relative to this file"
     )
     srdf: str | None = Field(default=None, description="the path of an .srdf relative to this file")
-    free_flyer: bool = Field(default=False, description="true or false")
+    free_flyer: bool | None = Field(
+        default=None, description="true or false; by default as the example robot's loader says"
+    )
     mimic: bool = Field(default=False, description="true or false")
     passive: list[str] = Field(default=[], description="a list of joint names")
     duration: Duration | None = Field(default=None, description=DURATION_IN_WORDS)

@@ -85,10 +85,16 @@ def _robot_keys(task: Task, folder: Path) -> dict[str, Any]:
         "locked": _locked(source),
         "package_dirs": _relative(source, folder),
         "srdf": None if _own_srdf(source) is None else _srdf_name(source),
-        "free_flyer": source.free_flyer or None,
+        "free_flyer": _free_flyer(source),
         "mimic": source.mimic or None,
         "passive": list(task.scene.passive),
     }
+
+
+def _free_flyer(source: RobotSource) -> bool | None:
+    """Whether the base floats, unless that is the default."""
+    floats = source.kind == "example" and example_robot(source.reference).free_flyer
+    return None if source.free_flyer == floats else source.free_flyer
 
 
 def _locked(source: RobotSource) -> Any:
