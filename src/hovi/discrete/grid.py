@@ -195,10 +195,7 @@ class Grid(Summarized):
         fixed, times = [0], list(dict.fromkeys(times))
         for time in times:
             if not 0 < time < self.duration:
-                raise InputError(
-                    f"a via point at {time:g} s is not inside the motion of {self.duration:g} s: "
-                    "choose a time within it."
-                )
+                raise InputError(outside_motion(time, self.duration))
             k = int(np.clip(np.argmin(np.abs(nodes - time)), fixed[-1] + 1, self.intervals))
             if k >= self.intervals:
                 raise InputError(
@@ -309,3 +306,11 @@ class DiscretePath(Summarized):
     def arrays(self) -> tuple[Array, Array, Array, Array]:
         """q, v, z and the inner modes."""
         return self.q, self.v, self.z, self.inner
+
+
+def outside_motion(time: float, duration: float) -> str:
+    """The message about a via point outside of the motion. time, duration: in [s]."""
+    return (
+        f"a via point at {time:g} s is not inside the motion of {duration:g} s: choose a time "
+        "within it."
+    )

@@ -166,9 +166,14 @@ NAMED: dict[str, Callable[[Coordinates, Boundary, float], Curve]] = {
 
 def named_curve(name: str, coordinates: Coordinates, boundary: Boundary, duration: float) -> Curve:
     """The guess with a name. Raises InputError for an unknown name."""
+    require_guess(name)
+    return NAMED[name](coordinates, boundary, duration)
+
+
+def require_guess(name: str) -> None:
+    """Raise InputError for an unknown name of a guess."""
     if name not in NAMED:
         raise InputError(f"there is no guess {name!r}: {nearest(name, NAMED)}")
-    return NAMED[name](coordinates, boundary, duration)
 
 
 def joined(pieces: Sequence[Curve], times: Array) -> Curve:

@@ -336,13 +336,17 @@ def test_after_an_interrupt_no_other_minimum_is_compared_with_a_finer_grid(
 @pytest.mark.parametrize(
     ("options", "error", "sentence"),
     [
-        ({"starts": 0}, InputError, "starts must be a whole number of 1 or more, got 0"),
-        ({"starts": 2.5}, InputError, "starts must be a whole number of 1 or more, got 2.5"),
-        ({"starts": np.nan}, InputError, "starts must be a whole number of 1 or more, got nan"),
-        ({"max_iterations": 0}, InputError, "max_iterations must be a whole number of 1 or more"),
+        ({"starts": 0}, InputError, "`starts` must be a whole number, 1 or more, but it is 0"),
+        ({"starts": 2.5}, InputError, "`starts` must be a whole number, 1 or more, but it is 2.5"),
+        (
+            {"starts": np.nan},
+            InputError,
+            "`starts` must be a whole number, 1 or more, but it is nan",
+        ),
+        ({"max_iterations": 0}, InputError, "`max_iterations` must be a whole number, 1 or more"),
         ({"limits": "urfd"}, InputError, "limits are .*'urfd'"),
-        ({"duration": 0.0}, InputError, "`duration` must be a positive number .* is 0.0"),
-        ({"duration": -1.0}, InputError, "`duration` must be a positive .* is -1.0"),
+        ({"duration": 0.0}, InputError, "`duration` must be a positive number .* is 0"),
+        ({"duration": -1.0}, InputError, "`duration` must be a positive .* is -1"),
         ({"duration": np.nan}, InputError, "`duration` must be a positive .* is nan"),
         ({"duration": np.inf}, InputError, "`duration` must be a positive .* is inf"),
         ({"goal": [np.nan, 0.0]}, InputError, "goal is nan at joint 'shoulder'"),
@@ -357,7 +361,7 @@ def test_after_an_interrupt_no_other_minimum_is_compared_with_a_finer_grid(
         (
             {"intervals": 0},
             InputError,
-            "intervals must be a whole number from 1 to 1,000,000, got 0",
+            "`intervals` must be a whole number from 1 to 1,000,000, but it is 0",
         ),
         ({"scheme": "galerkin"}, SchemeError, "no scheme 'galerkin': did you mean"),
         ({"scheme": "mean-difference"}, SchemeError, "'mean-difference' is not regular"),

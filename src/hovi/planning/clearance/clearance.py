@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from hovi.checks.arguments import check_arguments_except
+from hovi.checks.kinds import shown
 from hovi.errors import InputError
 from hovi.planning.obstacles.obstacle import Obstacle
 from hovi.system.dataclass import dataclass
@@ -72,8 +73,8 @@ class Clearance:
         number = isinstance(self.margin, float | int) and not isinstance(self.margin, bool)
         if not (number and 0 <= self.margin <= MAX_MARGIN):
             raise InputError(
-                "the margin from obstacles must be a length of 0 or more, in metres, got "
-                f"{self.margin!r}."
+                "`margin` must be a length of 0 or more, in metres, but it is "
+                f"{shown(self.margin)}."
             )
 
     @property

@@ -12,6 +12,7 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from hovi.checks.arguments import check_arguments_except
+from hovi.checks.kinds import shown
 from hovi.checks.shapes import numbers_of
 from hovi.checks.tables import entries_of
 from hovi.effects import Payload
@@ -87,7 +88,9 @@ class Grasped:
             raise InputError("a grasped object needs a name.")
         mass = numbers_of("mass", self.mass)
         if mass.shape or not 0.0 < mass <= MAX_MASS:
-            raise InputError(f"the mass of {self._what} must be positive, in kg, got {self.mass}.")
+            raise InputError(
+                f"the mass of {self._what} must be positive, in kg, got {_shown(mass)}."
+            )
         object.__setattr__(self, "mass", float(mass))
         for key, size in (("position", 3), ("rpy", 3), ("center", 3), ("inertia", 6)):
             if getattr(self, key) is not None:
@@ -191,6 +194,11 @@ def as_grasped(objects: Any) -> tuple[Grasped, ...]:
         if names.count(name) > 1:
             raise InputError(f"two grasped objects have the name {name!r}; give each its own name.")
     return tuple(objects)
+
+
+def _shown(mass: Array) -> str:
+    """A mass in a message."""
+    return shown(mass) if mass.shape else f"{float(mass):g}"
 
 
 def _from_table(table: Mapping[str, Any], number: int) -> Grasped:

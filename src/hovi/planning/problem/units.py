@@ -111,4 +111,9 @@ def _no_duration(given: Any) -> InputError:
 
 def _as_given(given: Any) -> str:
     pair = isinstance(given, list | tuple) and len(given) == 2
-    return f"[{', '.join(map(shown, given))}]" if pair else shown(given)
+    return f"[{', '.join(map(_number, given))}]" if pair else _number(given)
+
+
+def _number(given: Any) -> str:
+    """A duration in a message, with whole numbers without a point."""
+    return f"{given:.15g}" if isinstance(given, float) else shown(given)

@@ -65,13 +65,19 @@ def option_infos(options: type) -> dict[str, OptionInfo]:
     return {each.name: each.metadata["info"] for each in fields(options)}
 
 
-def keep_whole_numbers(options: Any) -> None:
+def keep_numbers(options: Any) -> None:
     """Convert integer options to int. Raises InputError for other numbers, or out of bounds."""
     defaults = {each.name: each.default for each in fields(options)}
     for name, known in option_infos(type(options)).items():
         number = getattr(options, name)
         if known.whole and (number is not None or defaults[name] is not None):
             object.__setattr__(options, name, _whole(name, known, number))
+        elif known.key is not None and not _is_at_least(known.least, number):
+            raise _refusal(name, known.key.must_be, number)
+
+
+def _is_at_least(least: int | None, number: Any) -> bool:
+    return least is None or (is_number(number) and bool(number >= least))
 
 
 def _whole(name: str, known: OptionInfo, number: Any) -> int:
@@ -79,10 +85,15 @@ def _whole(name: str, known: OptionInfo, number: Any) -> int:
     finite = is_number(number) and (isinstance(number, int) or math.isfinite(number))
     if finite and number == int(number) and least <= number <= most:
         return int(number)
-    allowed = f"of {least} or more" if known.most is None else f"from {least} to {known.most:,}"
-    if finite and known.most is None and number > most:
-        allowed = f"from {least} to {most:,}"
-    raise InputError(f"{name} must be a whole number {allowed}, got {shown(number)}.")
+    too_large = finite and number > most
+    open_ended = known.most is None and not too_large
+    allowed = f", {least} or more" if open_ended else f" from {least} to {most:,}"
+    raise _refusal(name, f"a whole number{allowed}", number)
+
+
+def _refusal(name: str, must_be: str, number: Any) -> InputError:
+    """The error about an option, in the words of the message about a scene file."""
+    return InputError(f"`{name}` must be {must_be}, but it is {shown(number)}.")
 
 
 def require_known(options: type, names: Iterable[str]) -> None:

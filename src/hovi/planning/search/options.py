@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy.typing as npt
 
 from hovi.checks.arguments import check_arguments_except
+from hovi.discrete.guess import require_guess
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError, expect, nearest
 from hovi.planning.clearance.clearance import DEFAULT_MARGIN, Clearance
@@ -22,7 +23,7 @@ from hovi.planning.problem.units import as_time_limit
 from hovi.planning.search.option_fields import (
     SceneKey,
     explain,
-    keep_whole_numbers,
+    keep_numbers,
     option,
     require_known,
     whole_number,
@@ -189,7 +190,9 @@ class PlanOptions:
     def __post_init__(self) -> None:
         if isinstance(self.scheme, Mapping):
             self._take_scheme_table(self.scheme)
-        keep_whole_numbers(self)
+        keep_numbers(self)
+        if isinstance(self.guess, str):
+            require_guess(self.guess)
         via, limit = self.via, self.time_limit_seconds
         if not isinstance(via, Sequence) or isinstance(via, str):
             raise InputError(f"via must be a list of hovi.Via(time, goal), got {via!r}.")

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pinocchio as pin
 
+from hovi.discrete.grid import outside_motion
 from hovi.discrete.state import State
 from hovi.errors import HoviError, InputError
 from hovi.planning.problem.frame_goal import FrameGoal
@@ -99,7 +100,7 @@ def read_via(
     for i, table in enumerate(tables):
         longest, time = float(np.max(duration)), _time(table.time, ("via", i, "time"), toml)
         if time >= longest:
-            sentence = f"the via point at {time:g} s is not inside the motion of {longest:g} s"
+            sentence = outside_motion(time, longest)
             raise toml.error(("via", i, "time"), sentence)
         try:
             require_no_rates(_given(table))

@@ -25,4 +25,5 @@ def _grasped(table: GraspedTable, number: int, toml: TomlText) -> Grasped:
     try:
         return Grasped(**{key: x for key, x in table.model_dump().items() if x is not None})
     except HoviError as wrong:
-        raise toml.error(("grasped", number), str(wrong)) from None
+        key = ("mass",) if str(wrong).startswith("the mass") else ()
+        raise toml.error(("grasped", number, *key), str(wrong)) from None

@@ -6,7 +6,7 @@ With it editors complete and check scene files: run `hovi schema --out scene.sch
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Literal
 
 from pydantic import Field, create_model
 
@@ -54,6 +54,7 @@ def json_schema() -> dict[str, Any]:
         "goal": (GoalTable | Bare | None, TaskTable.model_fields["goal"]),
         "obstacles": (list[_Entries] | _Entries, TaskTable.model_fields["obstacles"]),
         "grasped": (list[GraspedTable] | GraspedTable, TaskTable.model_fields["grasped"]),
+        "guess": (Literal["cubic", "minimum-jerk"], TaskTable.model_fields["guess"]),
         "tolerance": (
             float | str | None,
             Field(default=None, description=TaskTable.model_fields["tolerance"].description),

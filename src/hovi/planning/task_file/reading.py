@@ -112,7 +112,7 @@ def _options(
     try:
         options = PlanOptions(**{name: getattr(table, name) for name in PLAIN}, grasped=grasped)
     except InputError as wrong:
-        key = next((name for name in PLAIN if str(wrong).startswith(name)), "")
+        key = next((name for name in PLAIN if _is_about(wrong, name)), "")
         raise toml.error((key,), str(wrong)) from None
     tolerance = _read_tolerance(table.tolerance, robot, toml)
     scheme = _scheme(table)
@@ -127,6 +127,11 @@ def _options(
         tolerance=tolerance,
         group=table.group,
     )
+
+
+def _is_about(wrong: InputError, option: str) -> bool:
+    """Whether an error is about an option."""
+    return str(wrong).startswith((option, f"`{option}`", f"there is no {option} "))
 
 
 def _obstacles(

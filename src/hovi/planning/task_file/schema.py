@@ -227,7 +227,7 @@ class GraspedTable(Table):
 
     name: str = Field(default="grasped", description="the name of the object's link")
     frame: str = Field(description=GRASPED_KEYS["frame"])
-    mass: FiniteFloat = Field(gt=0, description=GRASPED_KEYS["mass"])
+    mass: FiniteFloat = Field(description=GRASPED_KEYS["mass"])
     shape: Any = Field(description=GRASPED_KEYS["shape"])
     position: Direction | None = Field(default=None, description="a list of three finite numbers")
     rpy: Direction | None = Field(
@@ -308,7 +308,7 @@ PLAIN: dict[str, SceneKey] = {
 
 _KINDS: dict[str, Any] = {
     "time_limit": PositiveSeconds | None,
-    "guess": Literal["cubic", "minimum-jerk"],
+    "guess": str,
 }
 """Types of options that the type of their default does not tell."""
 

@@ -110,7 +110,7 @@ def test_via_points_are_tables_or_objects(ur5: hovi.Robot) -> None:
     frame = as_via({"time": 1, "frame": "tool0", "axis": AXIS}, 0)
     assert isinstance(frame.goal, FrameGoal)
     for wrong, sentence in (
-        ({"q": Q}, "`via[3].time` is missing."),
+        ({"q": Q}, "`via[3].time` is missing; it must be a positive number of seconds, or a text"),
         ({"time": 1.0, "q": Q, "a": Q}, "a via point takes no `a`: leave it out."),
         ({"time": 1.0}, "`via[3]` needs q, or a frame and its target."),
         (3, "via must be a list of hovi.Via(time, goal), or of tables"),

@@ -163,7 +163,7 @@ WRONG: dict[str, tuple[dict[str, Any], tuple[str, ...]]] = {
     "a negative duration": (UR5 | {"duration": -1}, ("`duration` must be a positive number",)),
     "a falling pair of durations": (
         UR5 | {"duration": [2.0, 1.0]},
-        ("`duration` must be", "a list [lower, upper] of two, but it is [2.0, 1.0]."),
+        ("`duration` must be a list [lower, upper] whose lower bound", "but it is [2, 1]."),
     ),
     "a unit of time": (UR5 | {"duration": "1 sec"}, ("the duration '1 sec' has the unit 'sec'",)),
     "a joint that is left out": (

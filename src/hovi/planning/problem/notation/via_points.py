@@ -9,6 +9,7 @@ from hovi.checks.kinds import shown
 from hovi.errors import InputError
 from hovi.planning.problem.goals import Via
 from hovi.planning.problem.notation.ends import EndError, end_of
+from hovi.planning.problem.units import SECONDS_IN_WORDS
 
 
 def as_via(given: Any, number: int) -> Via:
@@ -22,7 +23,7 @@ def as_via(given: Any, number: int) -> Via:
         )
     name, table = f"via[{number}]", dict(given)
     if "time" not in table:
-        raise EndError(f"`{name}.time` is missing.", "time")
+        raise EndError(f"`{name}.time` is missing; it must be {SECONDS_IN_WORDS}.", "time")
     time = table.pop("time")
     require_no_rates(table)
     return Via(time, end_of(table, name))
