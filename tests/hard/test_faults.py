@@ -217,7 +217,7 @@ def test_ctrl_c_ends_every_command_without_a_traceback(
 
 
 SEVERAL_SOLVES: dict[str, Sequence[str]] = {
-    "rounds among obstacles": ("plan", "{scene}"),
+    "rounds among obstacles": ("plan", "{scene}", "--intervals", "100"),
     "grids to a tolerance": (
         *("plan", "panda_reach_rich", "--starts", "1", "--tolerance", "1e-8"),
     ),

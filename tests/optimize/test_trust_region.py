@@ -532,10 +532,10 @@ def test_it_ends_where_some_steps_together_decrease_the_value_by_a_small_share()
     assert (decreases[:-1] >= share).all()
 
 
-def test_a_direction_lost_in_rounding_errors_is_an_arithmetic_error(
+def test_a_direction_without_a_positive_length_is_an_arithmetic_error(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Its length would be the root of a negative number."""
+    """Among penalties of 1e12 rounding errors may leave the root of a negative number."""
     model = random_model(5, -1.0, seed=3, hard=True)
     monkeypatch.setattr(DenseModel, "metric_product", lambda self, s: -np.asarray(s))
     with pytest.raises(ArithmeticError, match="singular to rounding"):

@@ -22,8 +22,8 @@ Array = npt.NDArray[np.float64]
 MAX_INTERVALS = 10**7
 """Maximum number of intervals, also of a trajectory file."""
 MORE_MODES = 2
-"""Additional inner modes of the grid for error estimates. With one more, both costs may have nearly
-the same error, which their difference would not show."""
+"""Additional inner modes of the finer grid that error estimates compare with. With one more, both
+costs may have nearly the same error, which their difference would not show."""
 MIN_STEP, MAX_STEP = 1e-12, 1e9
 """Steps, in [s], whose powers do not overflow or underflow in double precision."""
 

@@ -144,6 +144,7 @@ def test_an_unactuated_floating_base_gets_no_constant_force() -> None:
     assert keys == arm == unactuated_base | {"gravity", "wrench"}
 
 
+@pytest.mark.filterwarnings("ignore:the payload of 100000 kg looks like grams")
 def test_a_diverging_simulation_has_no_tip_deviation(task: Task) -> None:
     heavy = study_effects(task, [Payload(task.scene.robot.tip_frame, 1e5)]).trials[0]
     assert heavy.open_loop is None or math.isfinite(heavy.open_loop)

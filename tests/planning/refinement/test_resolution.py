@@ -195,9 +195,28 @@ def test_no_estimate_is_kept_farther_away_where_a_joint_whirls(
     ends = hovi.State([0.0, 0.0]), hovi.State([1.2, 0.8])
     first = hovi.solve(hovi.TrajectoryProblem(ld, *ends))
     calls = comparisons(monkeypatch)
-    monkeypatch.setattr(resolution, "whirl", lambda motion: "a whirl")
     assert first.replan(goal=[1.22, 0.82]).success
+    assert not calls
+    again = hovi.solve(hovi.TrajectoryProblem(ld, *ends))
+    calls.clear()
+    monkeypatch.setattr(resolution, "whirl", lambda motion: "a whirl")
+    assert again.replan(goal=[1.22, 0.82]).success
     assert calls
+
+
+def test_an_estimate_without_limits_is_not_kept_above_the_largest_difference(
+    two_link: Robot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It has no safety factor, so that twice more than half of one per cent is too large."""
+    scene = Scene(two_link, [hovi.effects.Gravity()])
+    ld = DiscreteLagrangian(scene.effort_lagrangian(), Grid.uniform(1.0, 8, by_name("galerkin-2")))
+    ends = hovi.State([0.0, 0.0]), hovi.State([1.2, 0.8])
+    first = hovi.solve(hovi.TrajectoryProblem(ld, *ends))
+    for share, kept in ((0.4, True), (0.6, False)):
+        check = dataclasses.replace(first.check, estimate=share * RESOLVED)  # type: ignore[type-var]
+        calls = comparisons(monkeypatch)
+        assert dataclasses.replace(first, check=check).replan(goal=[1.22, 0.82]).success
+        assert bool(calls) != kept
 
 
 def test_within_limits_a_motion_is_compared_with_the_followed_finer_one(

@@ -192,8 +192,7 @@ class TrajectoryProblem(ProblemSummary):
     @cached_property
     def finer(self) -> TrajectoryProblem:
         """The same problem with more inner modes, for error estimates."""
-        last = vars(self).get("_finer_of_last")
-        if last is None:
+        if (last := vars(self).get("_finer_of_last")) is None:
             return self.on(self.grid.enriched(MORE_MODES))
         finer = self._with(last.ld)
         object.__setattr__(finer, "structure", last.structure)
@@ -205,6 +204,7 @@ class TrajectoryProblem(ProblemSummary):
         same_ends = np.array_equal(problem.free_ends, self.free_ends)
         if same_ends and problem.periodic == self.periodic:
             object.__setattr__(problem, "structure", self.structure)
+            # the finer problem of other ends, whose grid and structure are those of this one's
             last = vars(self).get("finer", vars(self).get("_finer_of_last"))
             object.__setattr__(problem, "_finer_of_last", last)
         return problem
@@ -285,7 +285,7 @@ class TrajectoryProblem(ProblemSummary):
 
     @cached_property
     def inertial_torque(self) -> float:
-        """max diag M(q0)/T^2, in [N m] or [N]: torques of a motion by 1; 0 without a robot."""
+        """max diag M(q0)/T^2, in [N m] or [N]: torque scale of a motion by 1 rad or 1 m, or 0."""
         if not self.about_robot:
             return 0.0
         mass = MassMatrix(self.scene.model)(self.boundary[0][None])[0]

@@ -179,12 +179,15 @@ class _Search:
         self.best = candidate
         return ""
 
-    def _evaluated(self, solution: Solution, before: float | None = None) -> Candidate:
-        """A solution with its estimated error, recorded as a round. before: see FinerSolution."""
+    def _evaluated(self, solution: Solution, previous_decrease: float | None = None) -> Candidate:
+        """A solution with its estimated error, recorded as a round.
+
+        previous_decrease: see FinerSolution.
+        """
         raise_if_interrupted()
         began = time.perf_counter()
         left = self.deadline.seconds_left
-        candidate = Candidate.of(solution, self.tolerance, left, before)
+        candidate = Candidate.of(solution, self.tolerance, left, previous_decrease)
         grid = solution.trajectory.grid
         points = sum(len(scheme.points) * len(index) for scheme, index in grid.groups)
         seconds = solution.solve_seconds + time.perf_counter() - began
@@ -225,7 +228,7 @@ class _Search:
         """The solution on the next grid, which may be that of the finer solution."""
         problem, finer = candidate.solution.problem, candidate.finer
         assert problem is not None
-        grid, before = next_grid(candidate), None
+        grid, previous = next_grid(candidate), None
         if finer is None:
             fine, known = problem.on(grid), candidate.solution
             along = _along(known.central, problem, fine)
@@ -233,14 +236,14 @@ class _Search:
         if grid is finer.problem.grid:
             solution = finer.finish()
             fine = finer.problem
-            before = None if solution is None else finer.decrease_to(solution)
+            previous = None if solution is None else finer.cost_decrease(solution)
         else:
             fine = problem.on(grid)
             solution = _solved_nearby(finer, fine)
         if solution is None:
             along = _along(finer.central, finer.problem, fine)
             solution = self._solved(fine, interpolated_to(finer, fine), candidate, along)
-        return self._evaluated(solution, before)
+        return self._evaluated(solution, previous)
 
     def _solved(
         self,

@@ -83,16 +83,17 @@ class Candidate:
         solution: Solution,
         tolerance: Tolerance,
         time_limit: float | None = None,
-        before: float | None = None,
+        previous_decrease: float | None = None,
     ) -> Self:
         """A solution with the estimate of its error.
 
-        time_limit: of the finer solution, in [s]. before: see FinerSolution.
+        time_limit: of the finer solution, in [s]. previous_decrease: see FinerSolution.
         """
         finer = finer_than(solution, time_limit) if solution.success else None
         if finer is None:
             return cls(solution, tolerance)
-        finer = dataclasses.replace(finer, before=before)
+        if np.array_equal(finer.problem.grid.steps, solution.trajectory.grid.steps):
+            finer = dataclasses.replace(finer, previous_decrease=previous_decrease)
         assert solution.problem is not None
         along = error_along(solution, finer)
         passive = passive_torque(solution.problem, solution.trajectory)

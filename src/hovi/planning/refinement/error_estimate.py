@@ -40,10 +40,11 @@ Array = npt.NDArray[np.float64]
 LIMITED_SAFETY_FACTOR = 3.0
 """Factor on estimates under limits, where the finer solution is not much better."""
 LEAST_SAFETY_FACTOR = 2.25
-"""The least such factor for costs, where their decay is known: see FinerSolution.safety_factor."""
+"""The least such factor for costs, where their decay is known: see FinerSolution.safety_factor.
+Larger than the 2 of a decay by one half, since kinks slow the decay down."""
 SAME_COST = 0.1
-"""Change of the cost of a finer solution up to which it is the same once it is finished, relative
-to its difference from the coarser one."""
+"""Largest change of a finer solution's cost when it is finished, relative to its difference from
+the coarser one, with which that difference is still used."""
 RICHER_LEVEL = 3e-4
 """Barrier parameter at which a solve with more modes begins within limits."""
 RICHER_BARRIER = 1e-7
@@ -123,8 +124,8 @@ class FinerSolution:
         Their sum is the difference of costs to first order.
     finish: returns the converged finer solution; None if that fails.
     central: of the finer solution within limits, which that of another motion may follow.
-    before: the difference of costs at which the coarser solution was itself the finer one, of as
-        many intervals with fewer modes; None if it was not.
+    previous_decrease: of the cost in the previous step by two modes, when the coarser solution was
+        itself the finer one; None if there was none.
     """
 
     problem: TrajectoryProblem
@@ -134,21 +135,25 @@ class FinerSolution:
     gains: Array
     finish: Callable[[], Solution | None]
     central: CentralPath | None = None
-    before: float | None = None
+    previous_decrease: float | None = None
 
     @property
     def safety_factor(self) -> float:
-        """Factor on the difference of costs within limits, at most LIMITED_SAFETY_FACTOR.
+        """Factor on the difference of costs within limits.
 
-        1 / (1 - rho) if differences go on to decay by rho as the last two do, but at least
-        LEAST_SAFETY_FACTOR.
+        1 / (1 - rho) for a geometric decay, with rho the ratio of the last two decreases, but at
+        least LEAST_SAFETY_FACTOR; LIMITED_SAFETY_FACTOR at most, and if rho is unknown.
         """
-        rho = 1.0 if self.before is None else (self.known - self.cost) / self.before
+        before = self.previous_decrease
+        rho = 1.0 if before is None else (self.known - self.cost) / before
         factor = 1.0 / (1.0 - rho) if 0.0 <= rho < 1.0 else LIMITED_SAFETY_FACTOR
         return float(np.clip(factor, LEAST_SAFETY_FACTOR, LIMITED_SAFETY_FACTOR))
 
-    def decrease_to(self, finished: Solution) -> float | None:
-        """What its cost is less than that of the coarser one; None if that is not of `finished`."""
+    def cost_decrease(self, finished: Solution) -> float | None:
+        """Decrease of the cost from the coarser solution to this one.
+
+        None if it is not positive, or if finishing changed the cost by more than SAME_COST of it.
+        """
         gain = self.known - self.cost
         same = abs(finished.cost - self.cost) <= SAME_COST * gain
         return gain if gain > 0.0 and same else None

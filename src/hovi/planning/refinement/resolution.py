@@ -60,8 +60,8 @@ NEARBY = 0.05
 """Change of q, and of T v, in [rad] or [m], up to which a motion near one that passed is not
 compared with a finer one again."""
 FARTHER, GROWTH = 0.5, 2.0
-"""The same change without obstacles and equations, while the same limits hold the motion, and no
-joint whirls where there are none; and the factor of the estimate that is kept beyond NEARBY."""
+"""The same without obstacles, equations and segments while the same limits are active or, without
+any, no joint whirls; and the factor on an estimate that is kept beyond NEARBY."""
 PRICE_CHANGE, LEAST_PRICE = 0.25, 0.02
 """Relative change of the price of a limit up to which it is the same one, and the least price, as a
 share of the cost, that this is relative to: see limit_prices."""
@@ -133,7 +133,7 @@ def resolved(solution: Solution) -> Solution:
         torque;
     (b) the solution on a finer grid, reached from this one, is a minimum whose cost differs by at
         most 1 %. The finer grid has two more modes per interval, of a Galerkin table for any
-        scheme; under limits every interval is halved instead;
+        scheme; under limits every interval is halved where that fails;
     (c) that solution was found;
     (d) no light joint without limits whirls too fast for the error of the cost; if one whirls
         fast, the finer solution has a minimum nearby on a still finer grid: see
@@ -153,7 +153,6 @@ def resolved(solution: Solution) -> Solution:
         return _not_checked(solution)
     if reason:
         return _unresolved(solution, reason)
-    assert solution.error_estimate is not None
     if solution.status is Status.STATIONARY:
         return dataclasses.replace(solution, check=resolved)
     return dataclasses.replace(solution, check=Resolution.of(solution, finer))
@@ -193,7 +192,7 @@ class Resolution(MotionCheck):
 
     path, cost: of the resolved motion. estimate: of the relative error of its cost, kept for
     motions near it. finer: the solution it was compared with, or None. motion: the resolved one;
-    None if that was a longer one.
+    None for the rest of a longer one.
     """
 
     path: DiscretePath
@@ -216,15 +215,15 @@ class Resolution(MotionCheck):
 
     @cached_property
     def prices(self) -> Array | None:
-        """Those of its limits; None without limits, and where they are not known."""
+        """Prices of its limits: see limit_prices; None without limits, and if not known."""
         motion = self.motion
         if motion is None or motion.problem is None or motion.forces is None:
             return None
         return limit_prices(motion) if motion.problem.limited else None
 
     @cached_property
-    def farthest(self) -> float:
-        """NEARBY, or FARTHER where that holds, if the same limits hold the motion."""
+    def largest_change(self) -> float:
+        """Largest change of q and T v, in [rad] or [m], at which the estimate is kept."""
         motion = self.motion
         if motion is None or motion.problem is None or not _is_plain(motion.problem):
             return NEARBY
@@ -232,7 +231,7 @@ class Resolution(MotionCheck):
         return FARTHER if calm else NEARBY
 
     def __call__(self, solution: Solution) -> Solution:
-        """The solution as `resolved` returns it, with (a) alone for a motion that is near."""
+        """The solution as `resolved` returns it; near the resolved motion with (a) at most."""
         estimate = self._kept_for(solution) if solution.success else None
         if estimate is None:
             return self._followed(solution) or resolved(solution)
@@ -267,10 +266,9 @@ class Resolution(MotionCheck):
             return resolved
         path = shift.path(self.path)
         cost = problem.ld.action(path)
-        least = max(least_cost(problem), 1e-300)
-        estimate = self.estimate * abs(self.cost) / max(abs(cost), least)
-        most = (LIMITED_SAFETY_FACTOR if problem.limited else 1.0) * RESOLVED
-        return resolved if estimate > most else Resolution(path, cost, estimate)
+        estimate = self.estimate * abs(self.cost) / max(abs(cost), least_cost(problem), 1e-300)
+        too_large = estimate > _largest_estimate(problem)
+        return resolved if too_large else Resolution(path, cost, estimate)
 
     def _kept_for(self, solution: Solution) -> float | None:
         """The estimate that is kept for a motion; None for one that is not near."""
@@ -281,25 +279,27 @@ class Resolution(MotionCheck):
             return None
         dq = problem.coordinates.difference(self.path.q, path.q)
         dv = problem.grid.duration * (path.v - self.path.v)
-        far = float(max(np.abs(dq).max(), np.abs(dv).max()))
-        if far > NEARBY and far > self.farthest:
+        far, more = float(max(np.abs(dq).max(), np.abs(dv).max())), 0.0
+        if far > NEARBY and far > self.largest_change:
             return None
-        more = 0.0
         if self.prices is not None:
             changes = np.abs(limit_prices(solution) - self.prices)
             if (changes > PRICE_CHANGE * np.maximum(self.prices, LEAST_PRICE)).any():
                 return None
             more = ERROR_PER_PRICE * float(changes.max())
         estimate = (1.0 if far <= NEARBY else GROWTH) * self.estimate + more
-        # an estimate is LIMITED_SAFETY_FACTOR times the difference that is to be small
-        small = (far <= NEARBY and more == 0.0) or estimate <= LIMITED_SAFETY_FACTOR * RESOLVED
+        small = (far <= NEARBY and more == 0.0) or estimate <= _largest_estimate(problem)
         return estimate if small else None
+
+
+def _largest_estimate(problem: TrajectoryProblem) -> float:
+    """That of a resolved motion: within limits it has a safety factor."""
+    return (LIMITED_SAFETY_FACTOR if problem.limited else 1.0) * RESOLVED
 
 
 def _is_plain(problem: TrajectoryProblem) -> bool:
     """Whether there are neither obstacles nor equations, and no segments."""
-    alone = problem.distances is None and not problem.constrained
-    return alone and problem.ld.segments is None
+    return problem.distances is None and not problem.constrained and problem.ld.segments is None
 
 
 def _compared_with_finer(solution: Solution) -> tuple[Solution, str, FinerSolution | None]:

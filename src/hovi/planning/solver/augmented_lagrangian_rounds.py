@@ -27,8 +27,8 @@ PENALTY_GROWTH = 10.0
 SLOW_DECREASE = 0.1
 """Ratio of successive residuals above which their decrease is too slow."""
 STUCK, MAX_STUCK = 0.95, 2
-"""Ratio of successive residuals above which the larger penalty is of no use, and the number of such
-rounds in a row after which the constraints are taken as impossible to meet."""
+"""Ratio of successive residuals above which a larger penalty had no effect, and the number of such
+penalties in a row after which the constraints are taken as infeasible."""
 MAX_PENALTY_RATIO = 1e9
 """Maximum penalty, relative to the initial one."""
 MAX_ROUNDS = 60
@@ -89,7 +89,7 @@ def minimize_constrained(
     multipliers = known or first_multipliers(problem, path)
     first = multipliers
     decrease = FIRST_DECREASE
-    last, stuck = (np.inf, np.inf), 0
+    last, stuck, grown = (np.inf, np.inf), [0, 0], [False, False]
     for _ in range(most):
         result = minimize(multipliers, path, decrease)
         path = result.x
@@ -105,13 +105,13 @@ def minimize_constrained(
                 sizes, last, (TORQUE_TOLERANCE, NODE_TOLERANCE), strict=True
             )
         ]
-        remains = any(
-            size > max(STUCK * before, FEASIBLE_RESIDUAL)
-            for size, before in zip(sizes, last, strict=True)
-        )
-        stuck = stuck + 1 if remains else 0
-        if stuck >= MAX_STUCK or _at_maximum_penalty(multipliers, first, slow):
+        stuck = [
+            count + 1 if larger and size > max(STUCK * before, FEASIBLE_RESIDUAL) else 0
+            for count, larger, size, before in zip(stuck, grown, sizes, last, strict=True)
+        ]
+        if max(stuck) >= MAX_STUCK or _at_maximum_penalty(multipliers, first, slow):
             break
+        grown = slow
         multipliers = multipliers.updated(residuals, problem.passive)
         multipliers = multipliers.with_scaled_penalties(
             *(PENALTY_GROWTH if each else 1.0 for each in slow)
@@ -170,12 +170,12 @@ def spurious_sentence(problem: TrajectoryProblem, path: DiscretePath) -> str:
 
 
 def unmet_sentence(problem: TrajectoryProblem, path: DiscretePath, residuals: Residuals) -> str:
-    """The constraint with the largest residual, as a sentence without its end."""
+    """As `missed_clause`, a sentence without its end that says what to do."""
     if residuals.torque_share > FEASIBLE_RESIDUAL or not problem.conditions:
-        joints = ", ".join(repr(joint) for joint in problem.scene.passive)
         return (
-            f"no motion was found with zero torque at passive joint {joints}: the remaining torque "
-            f"is {residuals.torque_share:.3g} of the largest; allow more time or change the goal"
+            f"no motion was found with zero torque at passive joint {_passive(problem)}: the "
+            f"remaining torque is {residuals.torque_share:.3g} of the largest; allow more time or "
+            "change the goal"
         )
     t, error = _worst_condition(problem, path, residuals)
     return (
@@ -185,12 +185,17 @@ def unmet_sentence(problem: TrajectoryProblem, path: DiscretePath, residuals: Re
 
 
 def missed_clause(problem: TrajectoryProblem, path: DiscretePath, residuals: Residuals) -> str:
-    """The constraint that a motion misses most, as a clause."""
+    """Passive torques if they are too large, else the goal that is missed most, as a clause."""
     if residuals.torque_share > FEASIBLE_RESIDUAL or not problem.conditions:
-        joints = ", ".join(repr(joint) for joint in problem.scene.passive)
-        return f"passive joint {joints} has {residuals.torque_share:.3g} of the largest torque"
+        share = residuals.torque_share
+        return f"the torque at passive joint {_passive(problem)} is {share:.3g} of the largest"
     t, error = _worst_condition(problem, path, residuals)
     return f"the goal at t = {t:.4g} s is missed: {error}"
+
+
+def _passive(problem: TrajectoryProblem) -> str:
+    """The names of the passive joints."""
+    return ", ".join(repr(joint) for joint in problem.scene.passive)
 
 
 def _worst_condition(

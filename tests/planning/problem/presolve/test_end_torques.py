@@ -127,7 +127,7 @@ def test_an_end_with_a_given_acceleration_has_the_torque_of_inverse_dynamics(
     assert ("at the goal is" in unavoidable_torque(asked, limits)) == (share < 1)
 
 
-@pytest.mark.parametrize(("smooth", "what"), [(False, "may not exist"), (True, "hardly exists")])
+@pytest.mark.parametrize(("smooth", "what"), [(False, "may not exist"), (True, "has to be zero")])
 def test_a_frame_goal_that_cannot_be_held_is_told_with_what_smooth_asks(
     ur5: hovi.Robot, smooth: bool, what: str
 ) -> None:

@@ -293,11 +293,11 @@ POSSIBLE: dict[str, tuple[dict[str, Any], tuple[str, ...]]] = {
     ),
     "a payload in grams": (
         UR5 | {"effects": GRAVITY | {"payload": {"frame": "tool0", "mass": 500.0}}} | BRIEF,
-        ("the payload of 500 kg looks like grams, which are 0.5 kg: the robot has 17 kg",),
+        ("the payload of 500 kg looks like grams, which are 0.5 kg", "moving links weigh 17 kg"),
     ),
     "gravity in millimetres": (
         UR5 | {"effects": {"gravity": {"acceleration": 9810.0}}} | BRIEF,
-        ("a gravity of 9810 m/s^2 looks like mm/s^2, which are 9.81 m/s^2",),
+        ("a gravity of 9810 m/s^2 looks like mm/s^2, which is 9.81 m/s^2",),
     ),
     "an orientation in degrees": (
         UR5 | {"goal": HANDLE | {"rpy": [180.0, 0.0, 90.0]}} | BRIEF,

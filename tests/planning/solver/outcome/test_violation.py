@@ -77,8 +77,8 @@ def test_a_passive_joint_with_a_torque_is_named(scene: hovi.Scene) -> None:
     ld = hovi.DiscreteLagrangian(hinge.effort_lagrangian(), free.trajectory.grid)
     problem = hovi.TrajectoryProblem(ld, hovi.State(START), hovi.State(GOAL))
     other = dataclasses.replace(free, problem=problem)
-    assert other.violation.startswith("passive joint 'elbow' has ")
-    assert other.violation.endswith(" of the largest torque")
+    assert other.violation.startswith("the torque at passive joint 'elbow' is ")
+    assert other.violation.endswith(" of the largest")
 
 
 def test_a_via_point_that_is_missed_is_named_with_its_time(found: hovi.Solution) -> None:

@@ -2,11 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
-import numpy as np
-import pinocchio as pin
-
 from hovi.discrete.state import Periodic, State
 from hovi.planning.clearance.clearance import Clearance
 from hovi.planning.problem.contradictions import contradiction
@@ -15,16 +10,9 @@ from hovi.planning.problem.limits import no_limits
 from hovi.planning.problem.presolve.end_torques import held_still
 from hovi.planning.problem.presolve.legs import Stop, frame_too_far
 from hovi.planning.problem.presolve.length_slips import length_slips
+from hovi.planning.problem.presolve.unit_slips import heavy_loads, long_durations
 from hovi.planning.problem.problem import TrajectoryProblem
-from hovi.scene.scene import Scene
 from hovi.system.dataclass import dataclass
-
-LONG, MANY_TIMES = 100.0, 500.0
-"""Duration in [s], and its ratio to the time at the velocity limits, from which both may have been
-meant in milliseconds."""
-MANY_ROBOTS, STRONG = 10.0, 1e3
-"""Mass of a payload, relative to the robot's, from which it may have been meant in grams, and the
-gravity from which it may have been meant in mm/s^2, in [m/s^2]."""
 
 
 @dataclass(frozen=True)
@@ -69,11 +57,12 @@ def about_limits(
     if short is not None:
         warnings.append(f"{short.clause}.")
     if not at_frame:
-        what = "the motion has to begin or end with an acceleration there, and may not exist"
-        if problem.ld.k > 2 and not problem.free_ends[1, 2].any():
-            what = "the motion ends without an acceleration there, and hardly exists"
+        moving = "the motion has to begin or end with an acceleration there, and may not exist"
+        still = "its acceleration has to be zero there, so that probably no motion exists"
+        at_rest = problem.ld.k > 2 and not problem.free_ends[1, 2].any()
         warnings += [
-            f"{clause}: {what}; reduce the load, or change the ends or the limits."
+            f"{clause}: {still if at_rest and 'at the goal' in clause else moving}; reduce the "
+            "load, or change the ends or the limits."
             for clause in held_still(problem, limits)
         ]
     return Findings("", tuple(warnings))
@@ -91,33 +80,4 @@ def slips(problem: TrajectoryProblem) -> list[str]:
     q = [problem.boundary[0], *inner]
     ends = [] if isinstance(problem.goal, FrameGoal) else [problem.boundary[2]]
     lengths = length_slips(problem.scene, problem.clearance or Clearance(), [*q, *ends])
-    return [*lengths, *_long_durations(problem), *_heavy_loads(problem.scene)]
-
-
-def _long_durations(problem: TrajectoryProblem) -> Iterator[str]:
-    """The duration, if it is long and hundreds of times what the URDF's velocities take."""
-    T, robot = problem.grid.duration, problem.robot
-    speed = np.where(robot.model.velocityLimit > 0.0, robot.model.velocityLimit, np.inf)
-    distance = np.abs(robot.difference(problem.boundary[0], problem.boundary[2]))
-    least = float((distance / speed).max())
-    if least > 0.0 and max(LONG, MANY_TIMES * least) <= T:
-        yield (
-            f"the duration of {T:g} s looks like milliseconds, which are {1e-3 * T:g} s: at the "
-            f"velocity limits of the URDF, the joints take {least:.2g} s."
-        )
-
-
-def _heavy_loads(scene: Scene) -> Iterator[str]:
-    """Payloads that weigh many times what the robot does, and gravity that no planet has."""
-    for effect in scene.effects:
-        values = vars(effect)
-        if effect.key == "payload":
-            mass, own = values["mass"], pin.computeTotalMass(scene.robot.model)
-            if mass > MANY_ROBOTS * own > 0.0:
-                yield (
-                    f"the payload of {mass:g} kg looks like grams, which are {1e-3 * mass:g} kg: "
-                    f"the robot has {own:.3g} kg."
-                )
-        if effect.key == "gravity" and values["acceleration"] > STRONG:
-            g = values["acceleration"]
-            yield f"a gravity of {g:g} m/s^2 looks like mm/s^2, which are {1e-3 * g:g} m/s^2."
+    return [*lengths, *long_durations(problem), *heavy_loads(problem.scene)]

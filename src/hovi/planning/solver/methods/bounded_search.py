@@ -79,9 +79,8 @@ class BoundedSearch:
         grid.
     multipliers, unmet: of the constraints, and why they cannot be met, or "".
     last: the problem and the motion of the last solve. solved: its outcome and its objective.
-    points: of the central path, with a larger barrier than that of the last solution.
-    timed: whether the duration is free. at_level: whether a solve begins on a central path, from
-        where steps may be long.
+    points: of the central path, with a larger barrier than that of the last solution. at_level:
+        whether a solve begins on one. timed: whether the duration is free.
     along, level: see InteriorPoint. plain: see minimize_bounded. locally_infeasible: see
         MethodResult.
     """
@@ -259,9 +258,10 @@ class BoundedSearch:
         margin = min(INITIAL_MARGIN, LEVEL_MARGIN * level)
         start = Barrier.central(objective.bounds, outputs.y, level * density, density, margin)
         self.at_level = True
-        outcome = self.solve(path, start)
-        self.at_level = False
-        return outcome
+        try:
+            return self.solve(path, start)
+        finally:
+            self.at_level = False
 
     def _solved_under_conditions(self, path: DiscretePath, start: Barrier | None) -> Bounded | None:
         """A solve whose steps meet the conditions at nodes; None where that fails."""
