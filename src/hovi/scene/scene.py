@@ -380,7 +380,7 @@ def _passive(robot: Robot, names: Sequence[str]) -> tuple[str, ...]:
         if name not in robot.joint_names:
             hint = robot.hint(str(name))
             if name == "root_joint":
-                hint = "its base is fixed; with `free_flyer` true it floats."
+                hint = "it is that of a base that floats, as with `free_flyer` true."
             raise SceneError(f"passive: robot {robot.name!r} has no joint {name!r}: {hint}")
     chosen = tuple(name for name in robot.joint_names if name in names)
     if chosen and len(chosen) == len(robot.joint_names):

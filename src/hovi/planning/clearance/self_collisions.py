@@ -31,25 +31,25 @@ def self_collision_pairs(
 
     All pairs of shapes on joints of which neither is the parent of the other, except those that the
     SRDF disables, and those that overlap at every one of many configurations: a warning names them.
-    may_touch: pairs of names of links about which there is no warning.
+    may_touch: pairs of names of links that may overlap without a warning.
     """
-    apart, touching = _sorted_pairs(robot)
+    apart, touching = _split_pairs(robot)
     allowed = {frozenset(each) for each in may_touch}
     links = [pair for pair in touching if frozenset(pair) not in allowed]
     grasped = added_links(robot.model)
-    for held, advice in (
-        (False, "disable them in an SRDF"),
-        (True, "name the links in `may_touch` of the grasped object"),
-    ):
-        named = [pair for pair in links if held != grasped.isdisjoint(pair)]
-        if named:
-            warn(_sentence(robot, named, advice))
+    of_robot = [pair for pair in links if grasped.isdisjoint(pair)]
+    of_grasped = [pair for pair in links if not grasped.isdisjoint(pair)]
+    if of_robot:
+        warn(_sentence(robot, of_robot, "disable them in an SRDF"))
+    if of_grasped:
+        advice = "name the links in `may_touch` of the grasped object"
+        warn(_sentence(robot, of_grasped, advice))
     return apart
 
 
 @lru_cache(maxsize=16)
-def _sorted_pairs(robot: Robot) -> tuple[tuple[tuple[int, int], ...], tuple[tuple[str, str], ...]]:
-    """The pairs of shapes that come apart, and the links of the others, each pair once."""
+def _split_pairs(robot: Robot) -> tuple[tuple[tuple[int, int], ...], tuple[tuple[str, str], ...]]:
+    """The pairs of shapes that can be kept apart, and the pairs of links of the others."""
     geometry = convex_geometry(robot)
     pairs = checked_pairs(robot.model, geometry, robot.semantics.disabled)
     touching = _always_overlapping(robot, geometry, pairs)

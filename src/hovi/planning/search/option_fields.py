@@ -65,7 +65,7 @@ def option_infos(options: type) -> dict[str, OptionInfo]:
     return {each.name: each.metadata["info"] for each in fields(options)}
 
 
-def keep_numbers(options: Any) -> None:
+def check_numbers(options: Any) -> None:
     """Convert integer options to int. Raises InputError for other numbers, or out of bounds."""
     defaults = {each.name: each.default for each in fields(options)}
     for name, known in option_infos(type(options)).items():

@@ -22,8 +22,8 @@ from hovi.planning.problem.tolerance import Tolerance
 from hovi.planning.problem.units import as_time_limit
 from hovi.planning.search.option_fields import (
     SceneKey,
+    check_numbers,
     explain,
-    keep_numbers,
     option,
     require_known,
     whole_number,
@@ -190,7 +190,7 @@ class PlanOptions:
     def __post_init__(self) -> None:
         if isinstance(self.scheme, Mapping):
             self._take_scheme_table(self.scheme)
-        keep_numbers(self)
+        check_numbers(self)
         if isinstance(self.guess, str):
             require_guess(self.guess)
         via, limit = self.via, self.time_limit_seconds
