@@ -47,18 +47,29 @@ def long_durations(problem: TrajectoryProblem) -> Iterator[str]:
 
 def heavy_loads(scene: Scene) -> Iterator[str]:
     """Sentences about payloads of many times the robot's mass, and about implausible gravity."""
-    if not any(effect.key in ("payload", "gravity") for effect in scene.effects):
-        return
-    from hovi.effects import Gravity, Payload
+    keys = {effect.key for effect in scene.effects}
+    if "payload" in keys:
+        yield from _heavy_payloads(scene)
+    if "gravity" in keys:
+        yield from _strong_gravity(scene)
+
+
+def _heavy_payloads(scene: Scene) -> Iterator[str]:
+    from hovi.effects import Payload  # loaded with the first payload
+
+    own = pin.computeTotalMass(scene.robot.model)
+    for effect in scene.effects:
+        if isinstance(effect, Payload) and effect.mass > GRAMS_RATIO * own > 0.0:
+            yield (
+                f"the payload of {effect.mass:g} kg looks like grams, which are "
+                f"{1e-3 * effect.mass:g} kg: the robot's moving links weigh {own:.3g} kg."
+            )
+
+
+def _strong_gravity(scene: Scene) -> Iterator[str]:
+    from hovi.effects import Gravity
 
     for effect in scene.effects:
-        if isinstance(effect, Payload):
-            mass, own = effect.mass, pin.computeTotalMass(scene.robot.model)
-            if mass > GRAMS_RATIO * own > 0.0:
-                yield (
-                    f"the payload of {mass:g} kg looks like grams, which are {1e-3 * mass:g} kg: "
-                    f"the robot's moving links weigh {own:.3g} kg."
-                )
         if isinstance(effect, Gravity) and effect.acceleration > MILLIMETRES_GRAVITY:
             g = effect.acceleration
             yield f"a gravity of {g:g} m/s^2 looks like mm/s^2, which is {1e-3 * g:g} m/s^2."
