@@ -15,7 +15,7 @@ import numpy.typing as npt
 from hovi.checks.arguments import check_arguments
 from hovi.checks.shapes import require_shape
 from hovi.discrete.contraction import AnyCharts, Expansion, contract, joined
-from hovi.discrete.grid import DiscretePath, Grid
+from hovi.discrete.grid import MORE_MODES, DiscretePath, Grid
 from hovi.discrete.instants import InstantBatch, Instants, instant_batches
 from hovi.discrete.interval_batch import Coordinates, IntervalBatch, Jet, interval_batches
 from hovi.discrete.interval_charts import charts_on, jet_on
@@ -74,6 +74,11 @@ class DiscreteLagrangian:
     def columns(self) -> int:
         """m, the number of columns of an interval: 2 k for its ends, and the inner modes."""
         return 2 * self.k + self.grid.inner_modes
+
+    @cached_property
+    def finer(self) -> DiscreteLagrangian:
+        """That of the grid with MORE_MODES, for error estimates."""
+        return DiscreteLagrangian(self.lagrangian, self.grid.enriched(MORE_MODES))
 
     @cached_property
     def chart(self) -> Chart | None:
@@ -150,10 +155,7 @@ class DiscreteLagrangian:
         coordinates: Coordinates = "nodal",
         jets: list[Jet] | None = None,
     ) -> Array:
-        """The gradient of every L_d in the columns of the coordinates, shape (N, m, n).
-
-        jets: as for `values`.
-        """
+        """The gradient of every L_d in columns of the coordinates, (N, m, n); jets as above."""
         self._check(path, jets)
         gradient = np.zeros((self.grid.intervals, self.columns, self.lagrangian.nv))
         parts = zip(self.lagrangians, self.batches, jets or self.jets(path), strict=True)
@@ -360,8 +362,7 @@ class DiscreteLagrangian:
         return jet_on(space, batch, path)
 
     def _charts(self, path: DiscretePath) -> list[AnyCharts] | None:
-        all_flat = self.chart is None
-        return None if all_flat else [self._charts_of(batch, path) for batch in self.batches]
+        return None if self.chart is None else [self._charts_of(b, path) for b in self.batches]
 
     def _charts_of(self, batch: Batch, path: DiscretePath) -> AnyCharts:
         assert self.chart is not None

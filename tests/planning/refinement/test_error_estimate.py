@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
-from hovi.discrete.grid import Grid
+from hovi.discrete.grid import MORE_MODES, Grid
 from hovi.discrete.measures.motion_error import (
     MotionError,
     deviation,
@@ -18,7 +18,7 @@ from hovi.discrete.state import State
 from hovi.effects import Gravity
 from hovi.errors import InputError
 from hovi.planning.problem.limits import Limits
-from hovi.planning.problem.problem import MORE_MODES, TrajectoryProblem
+from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.refinement.candidate import contributions
 from hovi.planning.refinement.error_estimate import (
     displaced,

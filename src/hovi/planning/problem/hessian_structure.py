@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
 
-from hovi.discrete.grid import Grid
+from hovi.discrete.grid import MORE_MODES, Grid
 from hovi.discrete.interval_batch import COORDINATES, Coordinates
 from hovi.optimize.banded_model import BandLayout
 from hovi.optimize.merge_tree import MergeTree, merge_levels
@@ -36,6 +37,11 @@ class ActionStructure:
     free_ends: Mask | None = None
     periodic: bool = False
     holds: tuple[Hold, ...] = ()
+
+    @cached_property
+    def finer(self) -> ActionStructure:
+        """That of the grid with MORE_MODES, for error estimates."""
+        return dataclasses.replace(self, grid=self.grid.enriched(MORE_MODES))
 
     @cached_property
     def metric(self) -> dict[Coordinates, Array]:

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from hovi.checks.arguments import check_arguments
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
-from hovi.discrete.grid import MORE_MODES, DiscretePath, Grid
+from hovi.discrete.grid import DiscretePath, Grid
 from hovi.discrete.guess import Boundary, Curve, moved, named_curve, path_on_grid, with_turns
 from hovi.discrete.path_of_any_order import moved_any, path_of_any_order, polynomial, with_fixed
 from hovi.discrete.state import Periodic, State
@@ -185,17 +185,16 @@ class TrajectoryProblem(ProblemSummary):
             require_regular(scheme)
         problem = copy.copy(self)  # nothing else depends on the grid
         object.__setattr__(problem, "ld", ld)
-        for name in ("structure", "torque_moments", "finer", "_finer_of_last"):
+        for name in ("structure", "torque_moments", "finer"):
             problem.__dict__.pop(name, None)
         return problem
 
     @cached_property
     def finer(self) -> TrajectoryProblem:
         """The same problem with more inner modes, for error estimates."""
-        if (last := vars(self).get("_finer_of_last")) is None:
-            return self.on(self.grid.enriched(MORE_MODES))
-        finer = self._with(last.ld)
-        object.__setattr__(finer, "structure", last.structure)
+        finer = self._with(self.ld.finer)
+        if self.structure.grid is self.grid:  # not that of another duration
+            object.__setattr__(finer, "structure", self.structure.finer)
         return finer
 
     def between(self, start: State, goal: State | FrameGoal | Periodic) -> TrajectoryProblem:
@@ -204,9 +203,6 @@ class TrajectoryProblem(ProblemSummary):
         same_ends = np.array_equal(problem.free_ends, self.free_ends)
         if same_ends and problem.periodic == self.periodic:
             object.__setattr__(problem, "structure", self.structure)
-            # the finer problem of other ends, whose grid and structure are those of this one's
-            last = vars(self).get("finer", vars(self).get("_finer_of_last"))
-            object.__setattr__(problem, "_finer_of_last", last)
         return problem
 
     def path(self, curve: Curve) -> DiscretePath:

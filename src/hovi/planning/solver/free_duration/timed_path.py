@@ -65,7 +65,7 @@ def stretched_problem(problem: TrajectoryProblem, duration: float) -> Trajectory
     ld = _new_lagrangian(problem.ld.lagrangian, grid)
     stretched = copy.copy(problem)
     object.__setattr__(stretched, "ld", ld)
-    for name in ("torque_moments", "finer", "_finer_of_last", "inertial_torque"):
+    for name in ("torque_moments", "finer", "inertial_torque"):
         stretched.__dict__.pop(name, None)
     object.__setattr__(stretched, "structure", problem.structure)
     return stretched
