@@ -166,15 +166,23 @@ def test_replanning_near_a_resolved_motion_keeps_its_estimate(arm_scene: Scene) 
     assert far.error_estimate == pytest.approx(abs(far.cost / true.cost - 1), rel=0.1)
 
 
+FREE_END = [1.2, 0.8]
+
+
+def free_reach(two_link: Robot) -> Solution:
+    """A reach to FREE_END without limits."""
+    scene = Scene(two_link, [hovi.effects.Gravity()])
+    ld = DiscreteLagrangian(scene.effort_lagrangian(), Grid.uniform(1.0, 8, by_name("galerkin-2")))
+    ends = hovi.State([0.0, 0.0]), hovi.State(FREE_END)
+    return hovi.solve(hovi.TrajectoryProblem(ld, *ends))
+
+
 @pytest.mark.parametrize(("far", "kept"), [(0.6, True), (1.6, False)])
 def test_the_estimate_of_a_motion_without_limits_is_kept_with_a_margin_farther_away(
     two_link: Robot, monkeypatch: pytest.MonkeyPatch, far: float, kept: bool
 ) -> None:
     """far: the change of q, and of T v, relative to FARTHER."""
-    scene = Scene(two_link, [hovi.effects.Gravity()])
-    ld = DiscreteLagrangian(scene.effort_lagrangian(), Grid.uniform(1.0, 8, by_name("galerkin-2")))
-    start, end = hovi.State([0.0, 0.0]), np.array([1.2, 0.8])
-    first = hovi.solve(hovi.TrajectoryProblem(ld, start, hovi.State(end)))
+    first, end = free_reach(two_link), np.array(FREE_END)
     calls = comparisons(monkeypatch)
     change = first.replan(goal=end + 0.01).trajectory.v - first.trajectory.v
     moved = first.replan(goal=end + 0.01 * far * FARTHER / np.abs(change).max())
@@ -190,14 +198,11 @@ def test_the_estimate_of_a_motion_without_limits_is_kept_with_a_margin_farther_a
 def test_no_estimate_is_kept_farther_away_where_a_joint_whirls(
     two_link: Robot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    scene = Scene(two_link, [hovi.effects.Gravity()])
-    ld = DiscreteLagrangian(scene.effort_lagrangian(), Grid.uniform(1.0, 8, by_name("galerkin-2")))
-    ends = hovi.State([0.0, 0.0]), hovi.State([1.2, 0.8])
-    first = hovi.solve(hovi.TrajectoryProblem(ld, *ends))
+    first = free_reach(two_link)
     calls = comparisons(monkeypatch)
     assert first.replan(goal=[1.22, 0.82]).success
     assert not calls
-    again = hovi.solve(hovi.TrajectoryProblem(ld, *ends))
+    again = free_reach(two_link)
     calls.clear()
     monkeypatch.setattr(resolution, "whirl", lambda motion: "a whirl")
     assert again.replan(goal=[1.22, 0.82]).success
@@ -208,10 +213,7 @@ def test_an_estimate_without_limits_is_not_kept_above_the_largest_difference(
     two_link: Robot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """It has no safety factor, so that twice more than half of one per cent is too large."""
-    scene = Scene(two_link, [hovi.effects.Gravity()])
-    ld = DiscreteLagrangian(scene.effort_lagrangian(), Grid.uniform(1.0, 8, by_name("galerkin-2")))
-    ends = hovi.State([0.0, 0.0]), hovi.State([1.2, 0.8])
-    first = hovi.solve(hovi.TrajectoryProblem(ld, *ends))
+    first = free_reach(two_link)
     for share, kept in ((0.4, True), (0.6, False)):
         check = dataclasses.replace(first.check, estimate=share * RESOLVED)  # type: ignore[type-var]
         calls = comparisons(monkeypatch)

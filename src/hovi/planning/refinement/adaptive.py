@@ -228,7 +228,8 @@ class _Search:
         """The solution on the next grid, which may be that of the finer solution."""
         problem, finer = candidate.solution.problem, candidate.finer
         assert problem is not None
-        grid, previous = next_grid(candidate), None
+        grid = next_grid(candidate)
+        previous = None
         if finer is None:
             fine, known = problem.on(grid), candidate.solution
             along = _along(known.central, problem, fine)

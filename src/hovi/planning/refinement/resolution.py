@@ -225,7 +225,7 @@ class Resolution(MotionCheck):
     def largest_change(self) -> float:
         """Largest change of q and T v, in [rad] or [m], at which the estimate is kept."""
         motion = self.motion
-        if motion is None or motion.problem is None or not _is_plain(motion.problem):
+        if motion is None or motion.problem is None or not _limits_alone(motion.problem):
             return NEARBY
         calm = self.prices is not None if motion.problem.limited else whirl(motion) is None
         return FARTHER if calm else NEARBY
@@ -280,7 +280,7 @@ class Resolution(MotionCheck):
         dq = problem.coordinates.difference(self.path.q, path.q)
         dv = problem.grid.duration * (path.v - self.path.v)
         far, more = float(max(np.abs(dq).max(), np.abs(dv).max())), 0.0
-        if far > NEARBY and far > self.largest_change:
+        if far > NEARBY and far > self.largest_change:  # which small changes need not know
             return None
         if self.prices is not None:
             changes = np.abs(limit_prices(solution) - self.prices)
@@ -297,8 +297,8 @@ def _largest_estimate(problem: TrajectoryProblem) -> float:
     return (LIMITED_SAFETY_FACTOR if problem.limited else 1.0) * RESOLVED
 
 
-def _is_plain(problem: TrajectoryProblem) -> bool:
-    """Whether there are neither obstacles nor equations, and no segments."""
+def _limits_alone(problem: TrajectoryProblem) -> bool:
+    """Whether limits alone restrict a motion: no obstacles, equations or segments."""
     return problem.distances is None and not problem.constrained and problem.ld.segments is None
 
 

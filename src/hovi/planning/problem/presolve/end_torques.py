@@ -26,15 +26,22 @@ def held_still(problem: TrajectoryProblem, limits: Limits) -> Iterator[str]:
 
     That is no contradiction where the robot may begin to fall, or come to rest from below.
     """
-    if not problem.about_robot or not any(end.bounded[3].any() for end in limits.at_ends):
+    for end in (0, 1):
+        yield from held_still_at(problem, limits, end)
+
+
+def held_still_at(problem: TrajectoryProblem, limits: Limits, end: int) -> Iterator[str]:
+    """As `held_still`, at one end: 0 for the start, 1 for the goal."""
+    here = limits.at_ends[end]
+    if not problem.about_robot or not any(each.bounded[3].any() for each in limits.at_ends):
         return
-    for i, end in enumerate(("start", "goal")):
-        here, scene = limits.at_ends[i], problem.scenes[-i]
-        if not problem.free_ends[i].any() and not problem.boundary[2 * i + 1].any():
-            tau = _static(scene, problem.boundary[2 * i][None], i * problem.grid.duration)
-            yield from _excess(problem, scene, tau, here, f"at the {end}")
-    if isinstance(problem.goal, FrameGoal) and not problem.goal.free_velocity:
-        yield from _at_frame_goal(problem, problem.goal, limits.at_ends[1])
+    if not problem.free_ends[end].any() and not problem.boundary[2 * end + 1].any():
+        scene, q = problem.scenes[-end], problem.boundary[2 * end]
+        tau = _static(scene, q[None], end * problem.grid.duration)
+        yield from _excess(problem, scene, tau, here, f"at the {('start', 'goal')[end]}")
+    goal = problem.goal
+    if end == 1 and isinstance(goal, FrameGoal) and not goal.free_velocity:
+        yield from _at_frame_goal(problem, goal, here)
 
 
 def static_sentence(problem: TrajectoryProblem, limits: Limits) -> str:

@@ -7,7 +7,7 @@ from hovi.planning.clearance.clearance import Clearance
 from hovi.planning.problem.contradictions import contradiction
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.limits import no_limits
-from hovi.planning.problem.presolve.end_torques import held_still
+from hovi.planning.problem.presolve.end_torques import held_still_at
 from hovi.planning.problem.presolve.legs import Stop, frame_too_far
 from hovi.planning.problem.presolve.length_slips import length_slips
 from hovi.planning.problem.presolve.unit_slips import heavy_loads, long_durations
@@ -57,14 +57,14 @@ def about_limits(
     if short is not None:
         warnings.append(f"{short.clause}.")
     if not at_frame:
-        moving = "the motion has to begin or end with an acceleration there, and may not exist"
-        still = "its acceleration has to be zero there, so that probably no motion exists"
-        at_rest = problem.ld.k > 2 and not problem.free_ends[1, 2].any()
-        warnings += [
-            f"{clause}: {still if at_rest and 'at the goal' in clause else moving}; reduce the "
-            "load, or change the ends or the limits."
-            for clause in held_still(problem, limits)
-        ]
+        for end in (0, 1):
+            what = "the motion has to begin or end with an acceleration there, and may not exist"
+            if problem.ld.k > 2 and not problem.free_ends[end, 2].any():
+                what = "its acceleration has to be zero there, so that probably no motion exists"
+            warnings += [
+                f"{clause}: {what}; reduce the load, or change the ends or the limits."
+                for clause in held_still_at(problem, limits, end)
+            ]
     return Findings("", tuple(warnings))
 
 

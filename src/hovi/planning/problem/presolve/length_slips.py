@@ -19,6 +19,7 @@ from hovi.robot.space.angle_ranges import rpy_in_degrees
 from hovi.scene.scene import Scene
 
 if TYPE_CHECKING:
+    from hovi.effects import Payload
     from hovi.planning.obstacles.grasped import Grasped
 
 Array = npt.NDArray[np.float64]
@@ -54,17 +55,22 @@ def length_slips(scene: Scene, clearance: Clearance, q: Sequence[Array]) -> Iter
     yield from _far_payloads(scene)
 
 
-def _far_payloads(scene: Scene) -> Iterator[str]:
+def payloads_of(scene: Scene) -> list[Payload]:
+    """The payloads of a scene, whose module is loaded with the first one."""
     if not any(effect.key == "payload" for effect in scene.effects):
-        return
+        return []
     from hovi.effects import Payload
 
-    for effect in scene.effects:
-        if isinstance(effect, Payload) and np.linalg.norm(effect.center) > FAR_CENTER:
-            shown = ", ".join(f"{x:g}" for x in effect.center)
+    return [effect for effect in scene.effects if isinstance(effect, Payload)]
+
+
+def _far_payloads(scene: Scene) -> Iterator[str]:
+    for payload in payloads_of(scene):
+        if np.linalg.norm(payload.center) > FAR_CENTER:
+            shown = ", ".join(f"{x:g}" for x in payload.center)
             yield (
-                f"the payload's center ({shown}) m is far from frame {effect.frame!r}: lengths are "
-                "in metres."
+                f"the payload's center ({shown}) m is far from frame {payload.frame!r}: lengths "
+                "are in metres."
             )
 
 

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 import pinocchio as pin
 
+from hovi.planning.problem.presolve.length_slips import payloads_of
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.scene.scene import Scene
 
@@ -26,7 +27,7 @@ def long_durations(problem: TrajectoryProblem) -> Iterator[str]:
     Of motions without via points, at the velocity limits of the problem and of the URDF.
     """
     T, robot, limits = problem.grid.duration, problem.robot, problem.limits
-    if problem.via:
+    if T < MILLISECONDS_FROM or problem.via:
         return
     given = robot.model.velocityLimit
     speed = np.where(given > 0.0, np.minimum(given, PLAUSIBLE_SPEED), PLAUSIBLE_SPEED)
@@ -34,7 +35,7 @@ def long_durations(problem: TrajectoryProblem) -> Iterator[str]:
         speed = np.minimum(speed, limits.at_ends[0].upper[1])
     distance = np.abs(robot.difference(problem.boundary[0], problem.boundary[2]))
     moving = distance > 0.0
-    if T < MILLISECONDS_FROM or not moving.any():
+    if not moving.any():
         return
     with np.errstate(divide="ignore"):
         least = float((distance[moving] / speed[moving]).max())
@@ -47,29 +48,13 @@ def long_durations(problem: TrajectoryProblem) -> Iterator[str]:
 
 def heavy_loads(scene: Scene) -> Iterator[str]:
     """Sentences about payloads of many times the robot's mass, and about implausible gravity."""
-    keys = {effect.key for effect in scene.effects}
-    if "payload" in keys:
-        yield from _heavy_payloads(scene)
-    if "gravity" in keys:
-        yield from _strong_gravity(scene)
-
-
-def _heavy_payloads(scene: Scene) -> Iterator[str]:
-    from hovi.effects import Payload  # loaded with the first payload
-
     own = pin.computeTotalMass(scene.robot.model)
-    for effect in scene.effects:
-        if isinstance(effect, Payload) and effect.mass > GRAMS_RATIO * own > 0.0:
+    for payload in payloads_of(scene):
+        if payload.mass > GRAMS_RATIO * own > 0.0:
             yield (
-                f"the payload of {effect.mass:g} kg looks like grams, which are "
-                f"{1e-3 * effect.mass:g} kg: the robot's moving links weigh {own:.3g} kg."
+                f"the payload of {payload.mass:g} kg looks like grams, which are "
+                f"{1e-3 * payload.mass:g} kg: the robot's moving links weigh {own:.3g} kg."
             )
-
-
-def _strong_gravity(scene: Scene) -> Iterator[str]:
-    from hovi.effects import Gravity
-
-    for effect in scene.effects:
-        if isinstance(effect, Gravity) and effect.acceleration > MILLIMETRES_GRAVITY:
-            g = effect.acceleration
-            yield f"a gravity of {g:g} m/s^2 looks like mm/s^2, which is {1e-3 * g:g} m/s^2."
+    g = float(np.linalg.norm(scene.model.gravity.linear))
+    if g > MILLIMETRES_GRAVITY:
+        yield f"a gravity of {g:g} m/s^2 looks like mm/s^2, which is {1e-3 * g:g} m/s^2."

@@ -19,10 +19,7 @@ from hovi.planning.solver.augmented_lagrangian_rounds import (
 )
 from hovi.planning.solver.central_path import CentralPath
 from hovi.planning.solver.limits.limit_rows import LimitRows
-from hovi.planning.solver.methods.bounded_search import (
-    Bounded,
-    BoundedSearch,
-)
+from hovi.planning.solver.methods.bounded_search import Bounded, BoundedSearch
 from hovi.planning.solver.methods.motion_legs import Leg, joined, legs_of
 from hovi.planning.solver.multipliers import Multipliers
 from hovi.planning.solver.near.clearance_rows import ClearanceRows
