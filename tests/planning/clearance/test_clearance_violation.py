@@ -17,6 +17,7 @@ from hovi.planning.clearance.clearance import Clearance
 from hovi.planning.clearance.clearance_violation import (
     approach_along,
     approach_sentence,
+    distance_in_words,
     near_pairs,
 )
 from hovi.planning.clearance.distances import Distances
@@ -123,3 +124,16 @@ def test_beyond_reach_an_approach_is_a_lower_bound(arm_scene: hovi.Scene) -> Non
     assert (found[far] > 0.5).all()
     assert (found <= exactly + 1e-12).all()
     np.testing.assert_allclose(found[~far], exactly[~far], atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("distance", "words"),
+    [
+        (-0.02, "overlap by 0.02 m"),
+        (-1.3e-17, "touch"),
+        (1.3e-17, "touch"),
+        (0.004, "are 0.004 m apart"),
+    ],
+)
+def test_shapes_whose_distance_is_a_rounding_error_touch(distance: float, words: str) -> None:
+    assert distance_in_words(distance) == words

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hovi.errors import InputError
-from hovi.planning.problem.units import as_duration, number_and_unit, seconds
+from hovi.planning.problem.units import as_duration, as_time_limit, number_and_unit, seconds
 
 
 @pytest.mark.parametrize(
@@ -74,3 +74,11 @@ def test_the_lower_bound_of_a_free_duration_is_below_the_upper_one(given: Any) -
 @pytest.mark.parametrize("text", ["1" + " " * 10**6 + "!", " " * 10**6, "1" * 10**6, "." * 10**6])
 def test_a_long_text_is_read_in_linear_time(text: str) -> None:
     number_and_unit(text)  # in quadratic time this would not return for hours
+
+
+@pytest.mark.parametrize("given", [0, -1, "-1 ms", np.nan])
+def test_a_time_limit_that_is_not_positive_is_refused(given: Any) -> None:
+    with pytest.raises(InputError):
+        as_time_limit(given)
+    assert as_time_limit("20 ms") == pytest.approx(0.02)
+    assert as_time_limit(None) is None

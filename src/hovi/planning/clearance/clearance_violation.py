@@ -20,6 +20,8 @@ REFINEMENT_PASSES = 4
 """Refinement passes, each with samples four times as dense."""
 REFINEMENT_DISTANCE = 0.05 * DISTANCE_SCALE
 """Closest approaches up to this much above the required distance are refined, in [m]."""
+TOUCHING = 1e-9
+"""Distance or depth up to which a pair touches, in [m]: rounding errors may have either sign."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,6 +133,8 @@ def approach_sentence(
 
 def distance_in_words(distance: float) -> str:
     """A signed distance as the predicate of a sentence about a pair."""
+    if abs(distance) < TOUCHING:
+        return "touch"
     if distance < 0:
         return f"overlap by {-distance:.3g} m"
     return f"are {distance:.3g} m apart"

@@ -63,8 +63,11 @@ def seconds(given: Any, what: str) -> float:
 
 
 def as_time_limit(given: float | str | None) -> float | None:
-    """A time limit in [s]; None for no limit. Raises InputError."""
-    return None if given is None else seconds(given, "time_limit")
+    """A time limit in [s]; None for no limit. Raises InputError for one that is not positive."""
+    limit = None if given is None else seconds(given, "time_limit")
+    if limit is not None and not limit > 0:
+        raise InputError(f"time_limit must be positive, in seconds, got {given}.")
+    return limit
 
 
 def _as_double(number: float, what: str) -> float:

@@ -193,11 +193,10 @@ class PlanOptions:
         check_numbers(self)
         if isinstance(self.guess, str):
             require_guess(self.guess)
-        via, limit = self.via, self.time_limit_seconds
+        _ = self.time_limit_seconds  # raises for one that is not positive
+        via = self.via
         if not isinstance(via, Sequence) or isinstance(via, str):
             raise InputError(f"via must be a list of hovi.Via(time, goal), got {via!r}.")
-        if limit is not None and not limit > 0:
-            raise InputError(f"time_limit must be positive, in seconds, got {self.time_limit}.")
         object.__setattr__(self, "via", tuple(as_via(each, i) for i, each in enumerate(via)))
         if not isinstance(self.grasped, tuple) or self.grasped:
             from hovi.planning.obstacles.grasped import as_grasped  # 10 ms
