@@ -82,8 +82,8 @@ def main() -> None:
     columns = ["joint", "+0.05: steps", "motion moves [rad]", "-0.05: steps", "motion moves [rad]"]
     print_table(columns, rows)
     print(
-        "The prediction, with its factorisation, counts as a step, and so does the last one, with "
-        "the exact Hessian; corrections, which cost a gradient each, do not.\n"
+        "The prediction counts as a step, and so does every one with an exact Hessian; chord "
+        "steps, which cost a gradient each, do not.\n"
     )
     print_machine(threads=1)
 

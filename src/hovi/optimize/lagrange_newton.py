@@ -106,7 +106,8 @@ def minimize_under_equations(
     """
     value, residual = objective.evaluate(x)
     start = np.zeros_like(residual) if multipliers is None else multipliers
-    outcome = ConstrainedOutcome(x, value, Stop.ITERATION_LIMIT, 0, [], [], False, start, penalty)
+    first = x, value, Stop.ITERATION_LIMIT, 0
+    outcome = ConstrainedOutcome(*first, multipliers=start, penalty=penalty)
     if not math.isfinite(value) or not np.isfinite(residual).all():
         outcome.stop = Stop.DIVERGED
         return outcome

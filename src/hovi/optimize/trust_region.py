@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import field
 from enum import StrEnum
 from typing import Generic, NamedTuple, TypeVar
@@ -18,6 +18,7 @@ from typing import Generic, NamedTuple, TypeVar
 import numpy as np
 import numpy.typing as npt
 
+from hovi.optimize.chord_steps import REMAINING_DECREASE, polish
 from hovi.optimize.quadratic_model import (
     Factor,
     QuadraticModel,
@@ -42,9 +43,6 @@ LAST_DECREASE = 1e-14
 """Relative predicted decrease below which an exact Newton step is the last in any case."""
 STALLED_STEPS = 5
 """See Options.stalled."""
-REMAINING_DECREASE = 1e-26
-"""Estimated relative decrease that may remain after the last step; its square root is the relative
-error of the point."""
 
 
 class Stop(StrEnum):
@@ -71,6 +69,10 @@ class Objective(ABC, Generic[X]):
 
         previous: the model at the last point, from which `step` led to x.
         """
+
+    def gradient(self, x: X, model: QuadraticModel) -> Array | None:
+        """The gradient at x in the unknowns of a model elsewhere; None if that has no use."""
+        return None
 
     @abstractmethod
     def retract(self, x: X, step: Array, model: QuadraticModel) -> X:
@@ -133,7 +135,7 @@ class Outcome(Generic[X]):
 
     value: the objective at x. iterations: number of steps tried, each with an entry in history.
     saddles_left: values at the saddles that were left along negative curvature.
-    convex: whether the last step was that of an exact model with positive definite Hessian.
+    convex: whether the last model was exact, with a positive definite Hessian. model: the last one.
     """
 
     x: X
@@ -143,6 +145,7 @@ class Outcome(Generic[X]):
     history: list[Iteration] = field(default_factory=list)
     saddles_left: list[float] = field(default_factory=list)
     convex: bool = False
+    model: QuadraticModel | None = None
 
 
 class Trial(NamedTuple):
@@ -226,11 +229,14 @@ def _iterate(
             if trial.along_negative_curvature and stationary:
                 outcome.saddles_left.append(outcome.value)
             outcome.x, outcome.value = candidate, value
+        if settled and accepted and exact and not last:
+            last = polish(objective, outcome, model, trial)
         if last or (settled and not accepted):
-            outcome.stop, outcome.convex = Stop.STATIONARY, exact
+            outcome.stop, outcome.convex, outcome.model = Stop.STATIONARY, exact, model
             return
         values.append(outcome.value)
-        if len(values) > STALLED_STEPS and _has_stalled(values, options):
+        gained = values[0] - values[-1]
+        if len(values) > STALLED_STEPS and gained < options.stalled * abs(values[0]):
             outcome.stop = Stop.STALLED
             return
         shift = next_shift(trial.shift, trial.norm, radius)
@@ -242,10 +248,6 @@ def _iterate(
         elif radius < 1e-14 * options.radius:
             outcome.stop = Stop.DIVERGED
             return
-
-
-def _has_stalled(values: Sequence[float], options: Options) -> bool:
-    return values[0] - values[-1] < options.stalled * abs(values[0])
 
 
 def _is_stationary(
@@ -262,9 +264,8 @@ def _is_stationary(
         return False
     if trial.decrease <= options.decrease * abs(outcome.value):
         return True
-    if trial.norm > SIZE_TEST_LENGTH * options.radius:
-        return False
-    return objective.relative_size(outcome.x, trial.step, model) <= options.step
+    short = trial.norm <= SIZE_TEST_LENGTH * options.radius
+    return short and objective.relative_size(outcome.x, trial.step, model) <= options.step
 
 
 def _is_last(
@@ -349,10 +350,8 @@ class _ShiftSearch:
             self.low = max(self.low, shift)
         else:
             self.high = min(self.high, shift)
-        more = (
-            trial.norm**2 / slope * (trial.norm - self.radius) / self.radius if slope > 0 else 0.0
-        )
-        newton = shift + more
+        norm, radius = trial.norm, self.radius
+        newton = shift + (norm**2 / slope * (norm - radius) / radius if slope > 0 else 0.0)
         if self.low < newton < self.high:
             return newton
         if trial.norm < self.radius and not self.indefinite and self.low == 0.0:

@@ -645,8 +645,8 @@ def test_a_warm_start_follows_the_ends_to_first_order(arm_scene: Scene, interval
     reach = solve_on_grid(problem_on(arm_scene, intervals=intervals))
     errors, sizes = [], np.array([0.06, 0.02])
     for size in sizes:
-        goal = State(REACH_Q + size, REACH_V - size)
-        problem = problem_on(arm_scene, START, goal, intervals=intervals)
+        start, goal = State(HANG - size, REST + size), State(REACH_Q + size, REACH_V - size)
+        problem = problem_on(arm_scene, start, goal, intervals=intervals)
         ahead = follow(reach.trajectory.path, problem)
         check_path(ahead, problem.grid, problem.robot)
         truth = solve_on_grid(problem, ahead).trajectory
@@ -655,19 +655,52 @@ def test_a_warm_start_follows_the_ends_to_first_order(arm_scene: Scene, interval
     assert order == pytest.approx(2.0, abs=0.3)
 
 
-def test_corrections_improve_on_first_order(arm_scene: Scene, reach: Solution) -> None:
-    problem = problem_on(arm_scene, START, State(REACH_Q + 0.05, REACH_V))
-    truth = solve_on_grid(problem, follow(reach.trajectory.path, problem)).trajectory
-    errors = []
-    for corrections in (0, 1, 6):
-        ahead = follow(reach.trajectory.path, problem, corrections)
-        check_path(ahead, problem.grid, problem.robot)
-        errors.append(np.abs(ahead.q - truth.q).max())
-    assert errors[1] < 0.5 * errors[0]
-    assert errors[2] < 0.02 * errors[0]
+def test_a_warm_start_evaluates_nothing_where_the_last_model_is_known(
+    arm_scene: Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    reach = solve_on_grid(problem_on(arm_scene))
+    old = reach.problem
+    assert old is not None
+    problem = old.between(START, State(REACH_Q + 0.02, REACH_V))
+    expected = follow(reach.trajectory.path, problem)
+    with monkeypatch.context() as patch:
+        patch.setattr(ActionObjective, "model", None)
+        ahead = follow(reach.trajectory.path, problem, reach.model)
+    check_path(ahead, problem.grid, problem.robot)
+    np.testing.assert_allclose(ahead.q, expected.q, rtol=0, atol=1e-6)
+    # a model of another grid is not used
+    finer = problem_on(arm_scene, START, State(REACH_Q + 0.02, REACH_V), intervals=64)
+    solved = solve_on_grid(problem_on(arm_scene, intervals=64)).trajectory.path
+    known, computed = (follow(solved, finer, model) for model in (reach.model, None))
+    np.testing.assert_array_equal(known.q, computed.q)
 
 
-def test_an_arm_replans_to_a_goal_nearby_in_at_most_four_steps() -> None:
+def test_a_motion_is_replanned_nearby_with_a_single_hessian(
+    arm_scene: Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    reach, hessians = solve_on_grid(problem_on(arm_scene)), []
+    model = ActionObjective.model
+    with monkeypatch.context() as patch:
+        patch.setattr(ActionObjective, "model", lambda *args: hessians.append(1) or model(*args))
+        again = reach.replan(goal=State(REACH_Q + 1e-3, REACH_V))
+    assert again.status is Status.MINIMUM
+    assert len(hessians) == 1
+
+
+@pytest.mark.parametrize("intervals", [1, 2, 3])
+def test_a_warm_start_moves_both_ends_of_a_few_intervals(arm_scene: Scene, intervals: int) -> None:
+    reach = solve_on_grid(problem_on(arm_scene, intervals=intervals, scheme="galerkin-3"))
+    start, goal = State(HANG + 1e-4, REST - 1e-4), State(REACH_Q - 1e-4, REACH_V + 1e-4)
+    problem = problem_on(arm_scene, start, goal, intervals=intervals, scheme="galerkin-3")
+    ahead = follow(reach.trajectory.path, problem)
+    check_path(ahead, problem.grid, problem.robot)
+    truth = solve_on_grid(problem, ahead).trajectory.path
+    before = reach.trajectory.path.arrays
+    for old, mine, true in zip(before, ahead.arrays, truth.arrays, strict=True):
+        np.testing.assert_allclose(mine, true, rtol=0, atol=1e-2 * np.abs(true - old).max())
+
+
+def test_an_arm_replans_to_a_goal_nearby_in_at_most_five_steps() -> None:
     task = load_task(example("ur5_reach"))
     grid = Grid.uniform(task.duration, 16, by_name("galerkin-2"))
     ld = DiscreteLagrangian(task.scene.effort_lagrangian(), grid)
@@ -679,7 +712,7 @@ def test_an_arm_replans_to_a_goal_nearby_in_at_most_four_steps() -> None:
         goal = goal + 0.05 * direction / np.linalg.norm(direction)
         motion = motion.replan(goal=goal)
         assert motion.status is Status.MINIMUM
-        assert motion.nit <= 4
+        assert motion.nit <= 5
 
 
 def test_a_replan_starts_from_the_motion_that_is_given(arm_scene: Scene) -> None:

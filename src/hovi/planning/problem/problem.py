@@ -117,7 +117,7 @@ class TrajectoryProblem(ProblemSummary):
         unreachable = end.reason or passed.reason
         object.__setattr__(self, "conditions", (*conditions, *passed.conditions))
         object.__setattr__(self, "holds", passed.holds)
-        self._set_ends(first, end.state)
+        self._set_ends(first, end.state, start)
         if self.about_robot and not self.periodic:
             known = self.scene, self.boundary, self.free_ends
             unreachable = unreachable or free_fall_contradiction(*known, self.grid.duration)
@@ -125,18 +125,17 @@ class TrajectoryProblem(ProblemSummary):
             object.__setattr__(self, "free_ends", independent)
         object.__setattr__(self, "unreachable", unreachable)
 
-    def _set_ends(self, start: State, goal: State) -> None:
-        """Set what both ends prescribe and leave free."""
+    def _set_ends(self, start: State, goal: State, at_start: tuple[Array, Array]) -> None:
+        """Set what both ends prescribe and leave free. at_start: q and v there."""
         coordinates, k = self.coordinates, self.ld.k
         named = (start, "start"), (goal, "goal")
-        q0, v0, q1, v1 = (x for state, name in named for x in state.on(coordinates, name))
         free = [state.free_on(coordinates, name, k) for state, name in named]
         for state, name in named:
             state.require_order(k, name)
         if k != 2:
             jets = [state.jet_on(coordinates, name)[:k] for state, name in named]
             object.__setattr__(self, "end_jets", tuple(map(np.stack, zip(*jets, strict=True))))
-        object.__setattr__(self, "boundary", (q0, v0, q1, v1))
+        object.__setattr__(self, "boundary", (*at_start, *goal.on(coordinates, "goal")))
         object.__setattr__(self, "free_ends", np.stack(free))
         object.__setattr__(self, "turns", goal.turns_on(coordinates, "goal"))
 

@@ -247,7 +247,8 @@ class ActionObjective(Objective[DiscretePath]):
         return MergeTreeModel(intervals, self.structure.tree)
 
     def gradient(self, x: DiscretePath, model: QuadraticModel) -> Array:
-        """The gradient at x in the unknowns of a model at another path."""
+        """The gradient at x in the unknowns of a model at another path, without equations."""
+        assert self.multipliers is None
         return model.scatter(self.ld.gradient(x, self.coordinates, self.jets(x)))
 
     def negative_eigenvalues(self, x: DiscretePath) -> int:

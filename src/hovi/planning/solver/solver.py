@@ -19,6 +19,7 @@ from hovi.discrete.measures.motion_effort import effort_of
 from hovi.discrete.state import Periodic
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError
+from hovi.optimize.quadratic_model import QuadraticModel
 from hovi.optimize.trust_region import Iteration, Options, Stop
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.notation.ends import End
@@ -55,8 +56,6 @@ if TYPE_CHECKING:
     from hovi.planning.solver.central_path import CentralPath
     from hovi.planning.solver.receding.shift import Shift
 
-MAX_CORRECTIONS = 6
-"""Maximum number of quasi-Newton steps on the initial guess of `replan`."""
 SOLVE_SHARE = 0.6
 """Share of a time limit of `replan` and `advance` for the solve, before the checks."""
 STATIONARY_DECREASE = 1e-9
@@ -76,13 +75,12 @@ class Solution(SolutionSummary):
     error_estimate: of the cost, relative; None if there is none.
     accuracy: the accuracy that was reached; None if no tolerance was given. nit: steps of the
         optimiser. n_neg: negative eigenvalues of the action's Hessian; -1 if they were not counted.
-    minima: costs of all minima that a multi-start found, ascending.
-    history: one record per step.
+    minima: costs of all minima that a multi-start found, ascending. history: one record per step.
     setup_seconds, solve_seconds: wall time before and during the solve. problem: what was solved.
     forces: multipliers of limits and of passive joints' torques at the quadrature points, and of
         limits at instants between them. instants: these; None for none.
-    central: the path of a barrier method to this motion; `replan` starts there. check: returns a
-        replanned motion with its error estimate or as UNRESOLVED; None for no check.
+    central, model: where `replan` starts, the path of a barrier method or else the last model.
+    check: returns a replanned motion with its error estimate or as UNRESOLVED; None for no check.
     locally_infeasible: whether the violation of limits has nonzero minima from several guesses.
     """
 
@@ -103,6 +101,7 @@ class Solution(SolutionSummary):
     forces: list[PointTerms] | None = field(default=None, repr=False)
     instants: Instants | None = field(default=None, repr=False)
     central: CentralPath | None = field(default=None, repr=False)
+    model: QuadraticModel | None = field(default=None, repr=False)
     check: Check | None = field(default=None, repr=False)
     locally_infeasible: bool = field(default=False, repr=False)
 
@@ -157,9 +156,8 @@ class Solution(SolutionSummary):
     ) -> Solution:
         """The motion between other states, with this motion or another as the initial guess.
 
-        Precomputed functions are reused, for planning in a loop. The guess is the first-order
-        prediction of the motion, which counts as one step, corrected by a few gradient
-        evaluations, which do not: see hovi.planning.solver.warm_start.
+        Precomputed functions are reused, for planning in a loop. The guess is the motion to first
+        order, which counts as one step: see hovi.planning.solver.warm_start.
         start, goal: as for `plan`, tables included; the goal may be Periodic, too; unchanged if
             None. A start at a frame is the configuration nearest to the old start.
         guess: an earlier solution on the same grid; this one if None. The duration is kept.
@@ -179,9 +177,9 @@ class Solution(SolutionSummary):
             old.start if start is None else as_start(start, old),
             old.goal if goal is None else as_goal(goal, old),
         )
-        origin = self if guess is None else guess
         central = self.central if guess is None else None
-        again = _Again(problem, origin.trajectory.path, central, self.check)
+        of = self if guess is None else guess
+        again = _Again(problem, of.trajectory.path, central, self.check, of.model)
         if self.status is Status.STATIONARY:
             options = {"method": Stationary()} | options
         return again.within(deadline, "this is the last motion", **options)
@@ -269,13 +267,14 @@ class MotionCheck(ABC):
 class _Again:
     """A solve that starts from the motion of a similar problem.
 
-    problem: to solve. path: the other motion, on its grid. central, check: see Solution.
+    problem: to solve. path: the other motion, on its grid. central, check, model: see Solution.
     """
 
     problem: TrajectoryProblem
     path: DiscretePath
     central: CentralPath | None
     check: Check | None
+    model: QuadraticModel | None = None
 
     def within(self, deadline: Deadline, last: str, **options: Any) -> Solution:
         """The solution, or what there is at the deadline. last: names the other motion."""
@@ -305,7 +304,7 @@ class _Again:
             options = {"method": method_from(self.central)} | options
         if problem.limited or not problem.plain:
             return solve_on_grid(problem, path, near=True, **options)
-        found = solve_on_grid(problem, follow(path, problem, MAX_CORRECTIONS), **options)
+        found = solve_on_grid(problem, follow(path, problem, self.model), **options)
         return dataclasses.replace(found, nit=found.nit + 1)
 
     def _kept(self, found: Solution) -> Solution:
@@ -389,6 +388,7 @@ def solution_of(result: MethodResult, setup_seconds: float, solve_seconds: float
         forces=result.forces,
         instants=result.instants,
         central=result.central,
+        model=result.model,
         locally_infeasible=result.locally_infeasible,
     )
 

@@ -6,71 +6,75 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.discrete.grid import DiscretePath
+from hovi.optimize.banded_model import BandModel
 from hovi.optimize.quadratic_model import QuadraticModel
-from hovi.optimize.quasi_newton import Smooth, descend
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.action_objective import ActionObjective
+from hovi.schemes.scheme import regular_from_nodal
 
 Array = npt.NDArray[np.float64]
 
-CORRECTION_DECREASE = 1e-9
-"""Predicted decrease, relative to the action, below which corrections stop."""
 
-
-def follow(solved: DiscretePath, problem: TrajectoryProblem, corrections: int = 0) -> DiscretePath:
+def follow(
+    solved: DiscretePath, problem: TrajectoryProblem, known: QuadraticModel | None = None
+) -> DiscretePath:
     """The path between new ends, predicted to first order from a stationary path.
 
-    dx = cubic - H^-1 H cubic, with the cubic that takes the old ends to the new ones and H the
-    action's Hessian at the old path: one Newton step of the equations linearised there. The cubic
-    alone if H is not positive definite.
+    dx = e - H^-1 H e, with e the change of the end nodes alone and H the Hessian of the action at
+    the old path: one Newton step of the equations linearised there. Where H is not positive
+    definite, or not only the ends are fixed, a cubic takes the old ends to the new ones.
 
     solved: a stationary path on the problem's grid, between other ends.
-    corrections: maximum number of quasi-Newton steps that follow; they reuse the factorisation of
-        H and need one gradient each.
+    known: the model near it with which it was found; computed at it if None, or if its unknowns are
+        not those of the problem.
     """
-    path = problem.moved(solved)
     if not problem.plain:
-        return path
+        return problem.moved(solved)
     objective = ActionObjective(problem)
-    model = objective.model(solved, None, None)
+    if not (isinstance(known, BandModel) and known.layout is problem.structure.layout):
+        known = None
+    model = objective.model(solved, None, None) if known is None else known
     factor = model.factor(0.0)
     if factor is None:
-        return path
-    change = _columns(objective, solved, path)
-    residual = np.einsum("kijab,kjb->kia", model.intervals.hessian, change)
-    step = factor.solve(-model.scatter(residual) - model.gradient)
-    predicted = objective.retract(path, step, model)
-    return descend(_Action(objective, model), predicted, factor, corrections, CORRECTION_DECREASE)
+        return problem.moved(solved)
+    ends = _ends(problem)
+    change = _columns(objective, solved, ends)
+    residual, moved = np.zeros_like(change), [0, -1]
+    # of two intervals alone, as no other one has a column that is fixed
+    hessian = model.intervals.hessian[moved]
+    residual[moved] = np.einsum("kijab,kjb->kia", hessian, change[moved])
+    change -= model.gather(factor.solve(model.scatter(residual)))
+    return _with_ends(objective.moved(solved, change), ends)
 
 
-class _Action(Smooth[DiscretePath]):
-    """The discrete action in the coordinates of a model."""
-
-    def __init__(self, objective: ActionObjective, model: QuadraticModel) -> None:
-        self.objective = objective
-        self.model = model
-
-    def value(self, x: DiscretePath) -> float:
-        return self.objective.value(x)
-
-    def gradient(self, x: DiscretePath) -> Array:
-        return self.objective.gradient(x, self.model)
-
-    def retract(self, x: DiscretePath, step: Array) -> DiscretePath:
-        return self.objective.retract(x, step, self.model)
+def _ends(problem: TrajectoryProblem) -> list[Array]:
+    """(q, q', ..., q^(k-1)) of both ends, k arrays of two rows."""
+    if problem.ld.k != 2:
+        return list(problem.end_jets)
+    q0, v0, q1, v1 = problem.boundary
+    return [np.array([q0, q1]), np.array([v0, v1])]
 
 
-def _columns(objective: ActionObjective, old: DiscretePath, new: DiscretePath) -> Array:
-    """Change of the intervals' columns between two paths, 0 for inner modes, shape (N, m, n)."""
+def _columns(objective: ActionObjective, old: DiscretePath, ends: list[Array]) -> Array:
+    """Change of the intervals' columns where the end nodes alone are moved, shape (N, m, n)."""
     problem = objective.problem
-    h, k = problem.grid.steps[:, None], problem.ld.k
-    dq = problem.coordinates.difference(old.q, new.q)
-    nodes = np.concatenate([dq[:, None], new.rates - old.rates], axis=1)  # (N + 1, k, n)
-    change = np.zeros((len(h), problem.ld.columns, dq.shape[1]))
-    powers = (h ** np.arange(k))[:, :, None]
-    change[:, :k] = powers * nodes[:-1]
-    if objective.coordinates == "nodal":
-        change[:, k : 2 * k] = powers * nodes[1:]
-    else:
-        change[:, k : 2 * k] = h[:, None] ** k * (new.z - old.z)
+    h, k = problem.grid.steps[[0, -1]], problem.ld.k
+    dq = problem.coordinates.difference(old.q[[0, -1]], ends[0])
+    rates = [new - old.rates[[0, -1], j] for j, new in enumerate(ends[1:])]
+    nodes = np.stack([dq, *rates], axis=1) * (h[:, None] ** np.arange(k))[:, :, None]
+    change = np.zeros((problem.grid.intervals, problem.ld.columns, dq.shape[1]))
+    change[0, :k] = nodes[0]
+    change[-1, k : 2 * k] = nodes[1]
+    if objective.coordinates == "regular":
+        for i in {0, len(change) - 1}:
+            change[i, : 2 * k] = regular_from_nodal(0, k) @ change[i, : 2 * k]
     return change
+
+
+def _with_ends(path: DiscretePath, ends: list[Array]) -> DiscretePath:
+    """A path with exactly these ends, which it has but for rounding errors."""
+    for mine, new in zip((path.q, path.v), ends, strict=False):
+        mine[[0, -1]] = new
+    for j, new in enumerate(ends[2:]):
+        path.higher[[0, -1], j] = new
+    return path

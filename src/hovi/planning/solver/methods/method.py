@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from hovi.discrete.grid import DiscretePath
 from hovi.discrete.instants import Instants
 from hovi.discrete.interval_batch import Jet
+from hovi.optimize.quadratic_model import QuadraticModel
 from hovi.optimize.trust_region import Iteration, Options
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.status import Status
@@ -35,6 +36,7 @@ class MethodResult:
         instants between them; None without any.
     instants: these instants; None without any.
     jets: (q, v, a) of the path at the quadrature points, if they were computed.
+    model: the quadratic model of the last step of a solve without bounds or equations.
     central: the path of a barrier method towards the motion, for warm starts.
     locally_infeasible: whether the violation of limits has minima that are not zero from several
         guesses.
@@ -51,6 +53,7 @@ class MethodResult:
     forces: list[PointTerms] | None = None
     instants: Instants | None = None
     jets: list[Jet] | None = None
+    model: QuadraticModel | None = None
     central: CentralPath | None = None
     locally_infeasible: bool = False
 

@@ -44,6 +44,7 @@ class TrustRegion(Method):
             n_neg,
             outcome.history,
             jets=objective.jets(outcome.x),
+            model=outcome.model,
         )
 
 
