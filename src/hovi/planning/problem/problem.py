@@ -198,7 +198,13 @@ class TrajectoryProblem(ProblemSummary):
 
     def between(self, start: State, goal: State | FrameGoal | Periodic) -> TrajectoryProblem:
         """The same problem between other states, sharing what was built for this one."""
-        problem = dataclasses.replace(self, start=start, goal=goal)
+        if isinstance(goal, State) and isinstance(self.goal, State):  # only conditions depend on it
+            problem = object.__new__(type(self))
+            given = {"ld": self.ld, "limits": self.limits, "clearance": self.clearance}
+            vars(problem).update(given, start=start, goal=goal, via=self.via)
+            problem._set_conditions(start, goal)
+        else:
+            problem = dataclasses.replace(self, start=start, goal=goal)
         same_ends = np.array_equal(problem.free_ends, self.free_ends)
         if same_ends and problem.periodic == self.periodic:
             object.__setattr__(problem, "structure", self.structure)
@@ -248,8 +254,7 @@ class TrajectoryProblem(ProblemSummary):
 
     def trajectory(self, path: DiscretePath) -> Trajectory:
         """A path on the grid as a trajectory without momenta, for sampling."""
-        momenta = np.zeros((path.intervals + 1, self.ld.k, path.v.shape[1]))
-        return self.motion(path, momenta, {})
+        return self.motion(path, np.zeros((path.intervals + 1, self.ld.k, path.v.shape[1])), {})
 
     def motion(self, path: DiscretePath, momenta: Array, metadata: dict[str, Any]) -> Trajectory:
         """A path on the grid as a trajectory; arguments as for Trajectory."""
