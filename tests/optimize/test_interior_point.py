@@ -347,6 +347,25 @@ def test_multipliers_satisfy_the_optimality_conditions() -> None:
     assert outcome.barrier.multipliers[0] == pytest.approx(4.0, rel=1e-6)
 
 
+@pytest.mark.parametrize("turn", np.linspace(0.02, 0.06, 9))
+def test_curvature_that_turns_negative_in_the_last_step_is_no_end(turn: float) -> None:
+    """On y = 0 the curvature in y is negative where 1 - x < turn, and x creeps towards 1."""
+
+    def f(x: ca.SX) -> ca.SX:
+        return 1 + (1 - x[0]) ** 4 + (1 - x[0] - turn) * x[1] ** 2 + x[1] ** 4
+
+    program = Program(2, f, lambda x: [x[0]], [-1e3], [1e3])
+    options = Options(decrease=1e-6, barrier=1e-9)
+    outcome = minimize_bounded(program, np.array([0.0, 0.0]), options)
+    assert outcome.stop is Stop.STATIONARY
+    assert outcome.model is not None
+    assert outcome.model.factor(0.0) is not None
+    stopped = minimize_bounded(
+        program, np.array([0.0, 0.0]), dataclasses.replace(options, escape_saddles=False)
+    )
+    assert outcome.outputs.value <= stopped.outputs.value
+
+
 @pytest.mark.parametrize("start", [[-3.0, 0.0], [-3.0, 0.1]])
 def test_a_stationary_point_of_a_model_without_all_of_its_curvature_is_no_end(
     start: list[float],

@@ -97,6 +97,8 @@ MAX_STALLED_STEPS = 12
 """Consecutive steps without progress after which the iteration ends as diverged."""
 MAX_UNMET = 4
 """Steps that predict next to nothing after which it ends although equations do not hold."""
+MAX_SADDLES = 5
+"""Number of saddles from which steps along negative curvature go on."""
 MAX_SLOW_STEPS = 40
 """Steps after which it ends as diverged if |y - s| was large in all and has hardly fallen."""
 SLOW_DECREASE, LARGE_VIOLATION = 0.1, 1e-3
@@ -152,7 +154,8 @@ class _Iteration(BoundedSteps[X]):
         self.violations: list[float] = []
         self.unmet = 0
         self.level = FIRST_REFINEMENT
-        self.refinements = self.reopenings = 0
+        self.refinements = self.reopenings = self.saddles = 0
+        self.saddle: X | None = None
         self.marks = outcome.marks
         self.marked = 0.0
         self.cut = 0
@@ -175,15 +178,17 @@ class _Iteration(BoundedSteps[X]):
             if finished and not refined:
                 exact, self.exact_from_now_on = self.exact, True
                 model = self.model()
-                if exact:
-                    self.outcome.stop, self.outcome.model = Stop.STATIONARY, model
-                    return
-                if model.factor(0.0) is None:  # a saddle, which is hardly left at the bounds
+                definite = model.factor(0.0) is not None
+                if exact and (definite or not self._leaves_saddle()):
+                    return self._end(model)
+                if not (exact or definite):  # a saddle, which is hardly left at the bounds
                     level = max(SADDLE_LEVEL, self.product / self.density)
                     self._move_inside(level * self.density, SADDLE_MARGIN * level)
                     model = self.model()
                 continue
             if self._is_hopeless():
+                if self.outcome.x is self.saddle:
+                    return self._end(model)
                 if not self._reopened():
                     self.outcome.stop = Stop.DIVERGED
                     return
@@ -258,6 +263,15 @@ class _Iteration(BoundedSteps[X]):
             marks.append((product, x))
         elif product <= MARKED_AGAIN * self.marked:
             marks[-1] = min(product, self.marked), x
+
+    def _end(self, model: QuadraticModel) -> None:
+        """End at a stationary point with its exact model."""
+        self.outcome.stop, self.outcome.model = Stop.STATIONARY, model
+
+    def _leaves_saddle(self) -> bool:
+        """Whether steps along negative curvature, which turned up at the end, are to follow."""
+        self.saddles, self.saddle = self.saddles + 1, self.outcome.x
+        return self.options.escape_saddles and self.saddles <= MAX_SADDLES
 
     def _is_hopeless(self) -> bool:
         """Whether the bounds seem impossible to meet from here."""
