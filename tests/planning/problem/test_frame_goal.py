@@ -131,7 +131,9 @@ def test_bad_goals_are_refused_in_one_sentence(ur5: Robot) -> None:
         ({"axis": ([0, 0, 0], [0, 0, 1])}, "has length zero"),
         ({"pose": np.eye(4), "position": [0, 0, 0]}, "not both"),
         ({"rotation": np.eye(3), "axis": ([0, 0, 1], [0, 0, 1])}, "not both"),
-        ({"pose": np.eye(3)}, r"\(4, 4\)"),
+        ({"pose": np.eye(3)}, r"\(4, 4\).*for a rotation alone write rotation="),
+        ({"pose": np.zeros(3)}, "for a position alone write position="),
+        ({"pose": np.eye(5)}, r"\(5, 5\)\.$"),
         (
             {"position": [0, 0, 0], "quaternion": [1, 0, 0, 0]},
             "has no `quaternion`: did you mean 'quaternion_xyzw' or 'quaternion_wxyz'",

@@ -286,6 +286,23 @@ def test_no_error_below_the_tolerance_of_limits_is_claimed(arm_scene: Scene) -> 
     assert "stopped early" in found.message
 
 
+def test_within_limits_a_solve_at_its_iteration_limit_is_continued() -> None:
+    """Once: a UR5 needs 13 steps on the second grid, and a sixth of them do not suffice."""
+    task = load_task(example("ur5_reach_limited"))
+    grid = first_grid(task.duration, 16, smooth=False)
+    ld = DiscreteLagrangian(task.scene.effort_lagrangian(), grid)
+    limits = as_limits(task.scene.robot, task.options.limits)
+    first = solve_on_grid(TrajectoryProblem(ld, task.start, task.goal, limits))
+    whole, continued, stopped = (
+        refine_to_tolerance(first, Tolerance(1e-3), max_iterations=most) for most in (500, 10, 2)
+    )
+    assert whole.success
+    assert continued.success
+    assert continued.cost == pytest.approx(whole.cost, rel=1e-4)
+    assert continued.nit > whole.nit
+    assert "stopped early: the last solve ended in iteration_limit" in stopped.message
+
+
 def test_an_interrupt_after_some_grids_returns_the_most_accurate_motion(arm_scene: Scene) -> None:
     """Under a limit, which takes many grids."""
     ld = DiscreteLagrangian(arm_scene.effort_lagrangian(), Grid.uniform(1.0, 6, galerkin(2)))

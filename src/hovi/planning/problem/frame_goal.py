@@ -35,6 +35,8 @@ MAX_ANGLE_ERROR = 1e-6
 """Angle in [rad] above which a frame whose equations hold is half a turn away from its goal."""
 _TURNS = ("rotation", *ORIENTATIONS, "axis")
 """What a frame goal says of its orientation: one of them at most."""
+_PARTS_OF_POSE = {(3,): "position", (3, 3): "rotation"}
+"""Parts of a pose that have arguments of their own, by their shapes."""
 ORTHONORMALITY_TOLERANCE = 1e-6
 """Largest deviation of a rotation matrix from orthonormality, and smallest length of an axis."""
 
@@ -102,7 +104,11 @@ class FrameGoal:
                 )
             matrix = _numbers("pose", getattr(self.pose, "homogeneous", self.pose))
             if matrix.shape != (4, 4):
-                raise InputError(f"a pose must be a matrix of shape (4, 4), got {matrix.shape}.")
+                part = _PARTS_OF_POSE.get(matrix.shape)
+                hint = f"; for a {part} alone write {part}=..." if part else ""
+                raise InputError(
+                    f"a pose must be a matrix of shape (4, 4), got {matrix.shape}{hint}."
+                )
             if not np.array_equal(matrix[3], [0.0, 0.0, 0.0, 1.0]):
                 raise InputError(f"the last row of a pose must be 0, 0, 0, 1, got {matrix[3]}.")
             object.__setattr__(self, "position", matrix[:3, 3])
