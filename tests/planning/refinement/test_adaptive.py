@@ -299,7 +299,7 @@ def test_within_limits_a_solve_at_its_iteration_limit_is_continued() -> None:
     assert whole.success
     assert continued.success
     assert continued.cost == pytest.approx(whole.cost, rel=1e-4)
-    assert accuracy_of(continued).rounds[1].steps > 20  # of both
+    assert accuracy_of(continued).rounds[1].nit > 20  # of both
     assert "stopped early: the last solve ended in iteration_limit" in stopped.message
 
 

@@ -262,7 +262,7 @@ class _Search:
             steps = min(steps, MAX_WORK // problem.grid.intervals)
         # A motion would be moved out of its obstacles once more, were it not for `near`. Within
         # limits alone a solve from the guess takes fewer steps, where it ends well.
-        taken = 0
+        taken, seconds = 0, 0.0
         for near in (True,) if problem.distances is not None else (None, True):
             solution = solve_on_grid(
                 problem,
@@ -273,12 +273,12 @@ class _Search:
                 near=near,
                 barrier=self.tolerance.barrier,
             )
-            taken += solution.nit
+            taken, seconds = taken + solution.nit, seconds + solution.solve_seconds
             if solution.status is Status.ITERATION_LIMIT and last.whirl is None:
                 guess = solution.trajectory.path  # from where it goes on
             elif solution.status is not Status.INFEASIBLE:  # the last grid has a motion
                 break
-        return dataclasses.replace(solution, nit=taken)
+        return dataclasses.replace(solution, nit=taken, solve_seconds=seconds)
 
     def _finished(self, chosen: Candidate, reason: str) -> Solution:
         """The chosen solution with its accuracy."""
