@@ -139,6 +139,8 @@ def obstacle_of_kind(
     others: kinds that exist elsewhere, for the message.
     """
     kind = table.get("kind")
+    if kind is None:
+        raise InputError(f"the kind is missing: {nearest('', [*kinds, *others])}")
     if not isinstance(kind, str) or kind not in kinds:
         likely = SYNONYMS.get(str(kind).lower(), str(kind))
         raise InputError(

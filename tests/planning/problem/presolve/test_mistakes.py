@@ -243,6 +243,10 @@ WRONG: dict[str, tuple[dict[str, Any], tuple[str, ...]]] = {
         UR5 | {"obstacles": [WALL | {"kind": "boks"}]},
         ("obstacle 'wall': there is no obstacle of kind 'boks': did you mean 'box'?",),
     ),
+    "an obstacle without a kind": (
+        UR5 | {"obstacles": [{key: value for key, value in WALL.items() if key != "kind"}]},
+        ("obstacle 'wall': the kind is missing: valid names are 'box', ",),
+    ),
     "an unknown key of an obstacle": (
         UR5 | {"obstacles": [{**WALL, "centre": [0, 0, 0]}]},
         ("obstacle 'wall': a box has no `centre`: ",),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,8 @@ import pytest
 
 import hovi
 from hovi.errors import InputError, UnreachableError
+from hovi.planning.search.options import PlanOptions
+from hovi.planning.solver.receding.ends import OF_THE_PLAN
 
 Q = [0.3, -1.2, 1.2, -0.5, 0.3, 0.1]
 HAND = [0.45, 0.25, 0.35]
@@ -91,11 +94,20 @@ def test_what_is_no_goal_gets_the_sentence_of_plan(
     assert str(told.value) == str(by_plan.value)
 
 
+def test_what_motions_planned_again_keep_are_options_of_plan() -> None:
+    known = {*inspect.signature(hovi.plan).parameters, *inspect.signature(PlanOptions).parameters}
+    assert set(OF_THE_PLAN) <= known
+
+
 def test_an_option_that_does_not_exist_is_named(planned: hovi.Solution) -> None:
     with pytest.raises(InputError, match="replan has no option 'gaol': did you mean 'goal'"):
         planned.replan(gaol=Q)
     with pytest.raises(InputError, match="advance has no option 'durations': did you mean"):
         planned.advance(0.1, durations=1.0)
+    with pytest.raises(InputError, match=r"replan keeps the duration of the plan: .* plan again"):
+        planned.replan(duration=1.0)
+    with pytest.raises(InputError, match=r"advance keeps the limits of the plan"):
+        planned.advance(0.1, limits="none")
     assert planned.replan(max_iterations=50, escape_saddles=False).success
 
 
