@@ -274,7 +274,7 @@ class _Search:
                 barrier=self.tolerance.barrier,
             )
             taken, seconds = taken + solution.nit, seconds + solution.solve_seconds
-            if solution.status is Status.ITERATION_LIMIT and last.whirl is None:
+            if solution.status is Status.ITERATION_LIMIT and problem.limited:
                 guess = solution.trajectory.path  # from where it goes on
             elif solution.status is not Status.INFEASIBLE:  # the last grid has a motion
                 break
