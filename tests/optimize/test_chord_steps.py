@@ -7,9 +7,9 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from hovi.optimize.chord_steps import polish
-from hovi.optimize.quadratic_model import QuadraticModel
-from hovi.optimize.trust_region import Options, Outcome, Stop, Trial, minimize
+from hovi.optimize.chord_steps import MAX_CHORD_STEPS, polish
+from hovi.optimize.quadratic_model import Factor, QuadraticModel
+from hovi.optimize.trust_region import Options, Stop, minimize
 from optimize.test_trust_region import Smooth
 
 Array = npt.NDArray[np.float64]
@@ -35,6 +35,23 @@ class WithGradients(Smooth):
         return super().model(x, previous, step)
 
 
+class WithoutGradients(WithGradients):
+    """Counts models alone."""
+
+    def gradient(self, x: Array, model: QuadraticModel) -> None:
+        return None
+
+
+class Soft:
+    """A factorisation whose steps are a fifth too short."""
+
+    def __init__(self, inner: Factor) -> None:
+        self.inner = inner
+
+    def solve(self, rhs: Array) -> Array:
+        return 0.8 * self.inner.solve(rhs)
+
+
 def valley(kind: type[Smooth] = WithGradients) -> Smooth:
     """A chain of Rosenbrock's function, plus one, whose minimum is MINIMUM."""
     x = ca.SX.sym("x", 3)
@@ -42,51 +59,62 @@ def valley(kind: type[Smooth] = WithGradients) -> Smooth:
     return kind(x, 1 + sum(terms))
 
 
-def newton_step(objective: Smooth, x: Array) -> tuple[Outcome[Array], QuadraticModel, Trial]:
-    """The outcome after a Newton step from x, with its model and its trial."""
+def newton_step(objective: Smooth, x: Array) -> tuple[Array, float, QuadraticModel, Factor, float]:
+    """The arguments of `polish` after a Newton step from x."""
     model = objective.model(x, None, None)
     factor = model.factor(0.0)
-    step, slope, length = model.descend(factor)
-    trial = Trial(step, -slope / 2, 0.0, length**0.5, factor=factor)
-    return Outcome(x + step, objective.value(x + step), Stop.ITERATION_LIMIT, 1), model, trial
+    assert factor is not None
+    step, slope, _ = model.descend(factor)
+    return x + step, objective.value(x + step), model, factor, -slope / 2
 
 
 def test_gradients_alone_reach_rounding_errors() -> None:
     objective = valley()
-    outcome, model, trial = newton_step(objective, NEARBY)
-    assert np.abs(outcome.x - MINIMUM).max() > 1e-9
-    assert polish(objective, outcome, model, trial)
-    np.testing.assert_allclose(outcome.x, MINIMUM, rtol=0, atol=1e-13)
-    assert outcome.value == objective.value(outcome.x)
+    after = newton_step(objective, NEARBY)
+    assert np.abs(after[0] - MINIMUM).max() > 1e-9
+    polished = polish(objective, *after)
+    assert polished is not None
+    np.testing.assert_allclose(polished[0], MINIMUM, rtol=0, atol=1e-13)
+    assert polished[1] == objective.value(polished[0])
     assert objective.models == 1
     assert objective.gradients <= 3
 
 
 @pytest.mark.parametrize("factor", [-1.0, 1e4, np.nan])
-def test_nothing_changes_where_gradients_do_not_decrease(factor: float) -> None:
+def test_steps_that_do_not_converge_are_given_up(factor: float) -> None:
     objective = valley()
-    outcome, model, trial = newton_step(objective, NEARBY)
-    x, value = outcome.x, outcome.value
+    after = newton_step(objective, NEARBY)
     objective.factor = factor
-    assert not polish(objective, outcome, model, trial)
-    assert outcome.x is x
-    assert outcome.value == value
+    assert polish(objective, *after) is None
+
+
+def test_steps_that_converge_slowly_are_given_up_after_a_few() -> None:
+    objective = valley()
+    x, value, model, factor, decrease = newton_step(objective, MINIMUM + 1e-3)
+    assert polish(objective, x, value, model, Soft(factor), decrease) is None
+    assert objective.gradients == MAX_CHORD_STEPS
+
+
+def test_a_value_that_increases_by_more_than_rounding_is_refused() -> None:
+    objective = valley()
+    x, value, *rest = newton_step(objective, NEARBY)
+    assert polish(objective, x, value - 1e-9, *rest) is None
+    assert polish(objective, x, value, *rest) is not None
 
 
 def test_an_objective_without_gradients_is_left_alone() -> None:
     objective = valley(Smooth)
-    outcome, model, trial = newton_step(objective, MINIMUM + 1e-4)
-    assert not polish(objective, outcome, model, trial)
+    assert polish(objective, *newton_step(objective, NEARBY)) is None
 
 
 def test_a_minimum_takes_fewer_models_with_gradients() -> None:
     options = Options(decrease=1e-6, exact=True)
-    with_gradients = valley()
+    with_gradients, without = valley(), valley(WithoutGradients)
     polished = minimize(with_gradients, NEARBY, options)
-    plain = minimize(valley(Smooth), NEARBY, options)
+    plain = minimize(without, NEARBY, options)
     for outcome in (polished, plain):
         assert outcome.stop is Stop.STATIONARY
         assert outcome.convex
         np.testing.assert_allclose(outcome.x, MINIMUM, rtol=0, atol=1e-12)
-    assert polished.iterations == plain.iterations - 1
+    assert with_gradients.models == without.models - 1
     assert with_gradients.gradients <= 2

@@ -347,7 +347,7 @@ def test_multipliers_satisfy_the_optimality_conditions() -> None:
     assert outcome.barrier.multipliers[0] == pytest.approx(4.0, rel=1e-6)
 
 
-@pytest.mark.parametrize("turn", np.linspace(0.02, 0.06, 9))
+@pytest.mark.parametrize("turn", [0.02, 0.025])
 def test_curvature_that_turns_negative_in_the_last_step_is_no_end(turn: float) -> None:
     """On y = 0 the curvature in y is negative where 1 - x < turn, and x creeps towards 1."""
 
@@ -360,10 +360,17 @@ def test_curvature_that_turns_negative_in_the_last_step_is_no_end(turn: float) -
     assert outcome.stop is Stop.STATIONARY
     assert outcome.model is not None
     assert outcome.model.factor(0.0) is not None
-    stopped = minimize_bounded(
-        program, np.array([0.0, 0.0]), dataclasses.replace(options, escape_saddles=False)
-    )
-    assert outcome.outputs.value <= stopped.outputs.value
+    left = dataclasses.replace(options, escape_saddles=False)
+    stopped = minimize_bounded(program, np.array([0.0, 0.0]), left)
+    assert stopped.stop is Stop.STATIONARY
+    assert stopped.model is not None
+    assert stopped.model.factor(0.0) is None
+    assert outcome.outputs.value < stopped.outputs.value - 1e-5
+    left = dataclasses.replace(options, max_iterations=stopped.iterations)
+    ended = minimize_bounded(program, np.array([0.0, 0.0]), left)  # at the saddle
+    assert ended.stop is Stop.STATIONARY
+    assert ended.model is not None
+    assert ended.model.factor(0.0) is None
 
 
 @pytest.mark.parametrize("start", [[-3.0, 0.0], [-3.0, 0.1]])

@@ -7,59 +7,65 @@ e in every chord step, which costs a gradient instead of a Hessian and its facto
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, TypeVar
+from typing import Protocol, TypeVar
 
 import numpy as np
+import numpy.typing as npt
 
-from hovi.optimize.quadratic_model import QuadraticModel
+from hovi.optimize.quadratic_model import Factor, QuadraticModel
 
-if TYPE_CHECKING:
-    from hovi.optimize.trust_region import Objective, Outcome, Trial
-
+Array = npt.NDArray[np.float64]
 X = TypeVar("X")
 
-MAX_STEPS = 3
+MAX_CHORD_STEPS = 3
 """Maximum number of chord steps; where they do not suffice, a Hessian is better."""
 LARGEST_RATIO = 0.1
-"""Largest ratio of the decreases that two successive steps predict for which they are taken."""
+"""Largest ratio of the decreases predicted by successive steps; above, chord steps are given up."""
 REMAINING_DECREASE = 1e-26
 """Estimated relative decrease that may remain after the last step; its square root is the relative
 error of the point."""
-FIRST_RATIO = 1e4
-"""Largest ratio of the decreases before and after the first chord step, relative to that of the
-Newton step's and the chord step's: a Newton step along a stiff direction leaves an error along a
-soft one, which chord steps reduce less."""
+FIRST_SAFETY_FACTOR = 1e4
+"""Safety factor on the decrease that is estimated to remain after the first chord step: a Newton
+step along a stiff direction leaves an error along a soft one, which chord steps reduce less."""
 NOISE = 1e-12
 """Relative increase of the value that counts as rounding."""
 
 
-def polish(
-    objective: Objective[X], outcome: Outcome[X], model: QuadraticModel, trial: Trial
-) -> bool:
-    """Improve a point until only rounding remains; whether that was reached, else it is unchanged.
+class Smooth(Protocol[X]):
+    """A smooth objective: see hovi.optimize.trust_region.Objective."""
 
-    The decrease that remains after a chord step is estimated from the ratio of those that it and
-    the step before it predict.
-    outcome: whose point the Newton step of the trial led to. model: that of the trial, exact.
+    def value(self, x: X) -> float:
+        """The objective at x."""
+
+    def gradient(self, x: X, model: QuadraticModel) -> Array | None:
+        """The gradient at x in the unknowns of a model elsewhere; None without gradients."""
+
+    def retract(self, x: X, step: Array, model: QuadraticModel) -> X:
+        """The point that a step of a model leads to."""
+
+
+def polish(
+    objective: Smooth[X], x: X, value: float, model: QuadraticModel, factor: Factor, decrease: float
+) -> tuple[X, float] | None:
+    """A point with its value after chord steps until only rounding remains; None if it does not.
+
+    A step that predicts the decrease d, after one that predicted d', leaves d^2 / d' to be gained.
+
+    x, value: after a Newton step of the model, exact, which predicted the decrease. factor: of the
+        model.
     """
-    size, before, x = abs(outcome.value), trial.decrease, outcome.x
-    factor, margin = trial.factor, FIRST_RATIO
-    if factor is None:
-        return False
-    for _ in range(MAX_STEPS):
+    start, size, before, safety = value, abs(value), decrease, FIRST_SAFETY_FACTOR
+    for _ in range(MAX_CHORD_STEPS):
         gradient = objective.gradient(x, model)
         if gradient is None:
-            return False
+            return None
         step = -factor.solve(gradient)
-        decrease = -0.5 * float(np.vdot(gradient, step))
-        if not decrease <= LARGEST_RATIO * before:
-            return False
+        predicted = -0.5 * float(np.vdot(gradient, step))
+        if not predicted <= LARGEST_RATIO * before:
+            return None
         x = objective.retract(x, step, model)
-        if margin * decrease * (decrease / before) <= REMAINING_DECREASE * size:
+        if safety * predicted * (predicted / before) <= REMAINING_DECREASE * size:
             value = objective.value(x)
-            if not value <= outcome.value + NOISE * size:
-                return False
-            outcome.x, outcome.value = x, value
-            return True
-        before, margin = decrease, 1.0
-    return False
+            return (x, value) if value <= start + NOISE * size else None
+        before, safety = predicted, 1.0
+    return None

@@ -150,16 +150,13 @@ class _Iteration(BoundedSteps[X]):
         super().__init__(objective, outcome, options, density)
         self.plain = self.cautious = plain
         self.report = report
-        self.stalled = 0
+        self.stalled = self.unmet = 0
         self.violations: list[float] = []
-        self.unmet = 0
         self.level = FIRST_REFINEMENT
         self.refinements = self.reopenings = self.saddles = 0
         self.saddle: X | None = None
-        self.marks = outcome.marks
-        self.marked = 0.0
-        self.cut = 0
-        self.radius_to_restore = 0.0
+        self.marks, self.marked = outcome.marks, 0.0
+        self.cut, self.radius_to_restore = 0, 0.0
 
     def run(self) -> None:
         """Iterate until stationary, or until a limit is reached."""
@@ -179,7 +176,7 @@ class _Iteration(BoundedSteps[X]):
                 exact, self.exact_from_now_on = self.exact, True
                 model = self.model()
                 definite = model.factor(0.0) is not None
-                if exact and (definite or not self._leaves_saddle()):
+                if exact and (definite or not self._leave_saddle()):
                     return self._end(model)
                 if not (exact or definite):  # a saddle, which is hardly left at the bounds
                     level = max(SADDLE_LEVEL, self.product / self.density)
@@ -195,6 +192,8 @@ class _Iteration(BoundedSteps[X]):
                 refined = True
             if accepted or refined:
                 model = self.model()
+        if self.outcome.x is self.saddle:
+            self._end(model)
 
     def _try(self, step: BoundedStep, model: QuadraticModel) -> bool:
         outcome, trial, along = self.outcome, step.trial, step.along
@@ -268,9 +267,12 @@ class _Iteration(BoundedSteps[X]):
         """End at a stationary point with its exact model."""
         self.outcome.stop, self.outcome.model = Stop.STATIONARY, model
 
-    def _leaves_saddle(self) -> bool:
-        """Whether steps along negative curvature, which turned up at the end, are to follow."""
-        self.saddles, self.saddle = self.saddles + 1, self.outcome.x
+    def _leave_saddle(self) -> bool:
+        """Prepare for steps along negative curvature, which turned up at the end; False for none.
+
+        None follow where a saddle is to be an end, and after the last of MAX_SADDLES.
+        """
+        self.saddles, self.saddle, self.stalled = self.saddles + 1, self.outcome.x, 0
         return self.options.escape_saddles and self.saddles <= MAX_SADDLES
 
     def _is_hopeless(self) -> bool:

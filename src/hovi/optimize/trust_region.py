@@ -71,7 +71,7 @@ class Objective(ABC, Generic[X]):
         """
 
     def gradient(self, x: X, model: QuadraticModel) -> Array | None:
-        """The gradient at x in the unknowns of a model elsewhere; None if that has no use."""
+        """The gradient at x in the unknowns of a model elsewhere; None without gradients."""
         return None
 
     @abstractmethod
@@ -93,7 +93,7 @@ class Options:
     max_iterations: number of steps, rejected ones included. time_limit: in [s], or None.
     radius: first radius of the trust region, in the metric; with bounds: BoundedObjective.radii.
     escape_saddles: leave a saddle along negative curvature; False stops there.
-    exact: stop only after a Newton step of an exact model, after which only rounding remains.
+    exact: stop only where rounding alone remains, after a Newton step of an exact model.
     near: whether the first iterate is near a solution, so that a barrier begins small.
     barrier: its last parameter, relative to the mean density of the objective.
     enough: with bounds, stop within them where a whole Newton step predicts a smaller decrease,
@@ -229,8 +229,10 @@ def _iterate(
             if trial.along_negative_curvature and stationary:
                 outcome.saddles_left.append(outcome.value)
             outcome.x, outcome.value = candidate, value
-        if settled and accepted and exact and not last:
-            last = polish(objective, outcome, model, trial)
+        if settled and accepted and exact and not last and trial.factor is not None:
+            polished = polish(objective, candidate, value, model, trial.factor, trial.decrease)
+            if polished is not None:
+                last, (outcome.x, outcome.value) = True, polished
         if last or (settled and not accepted):
             outcome.stop, outcome.convex, outcome.model = Stop.STATIONARY, exact, model
             return
@@ -320,8 +322,7 @@ class _ShiftSearch:
     def __init__(self, model: QuadraticModel, radius: float, guess: float) -> None:
         self.model = model
         self.radius = radius
-        self.low = 0.0
-        self.high = math.inf
+        self.low, self.high = 0.0, math.inf
         self.indefinite = False
         self.reached = guess > 0.0
 

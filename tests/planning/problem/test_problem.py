@@ -12,8 +12,10 @@ from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import Grid
 from hovi.discrete.guess import cubic
 from hovi.discrete.state import State
-from hovi.effects import Gravity
+from hovi.effects import Gravity, JerkCost
 from hovi.errors import InputError, ModelError, SchemeError
+from hovi.planning.problem.goals import Via
+from hovi.planning.problem.limits import as_limits
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.robot.loading import load_robot
 from hovi.robot.robot import Robot
@@ -58,6 +60,41 @@ def test_between_other_ends_the_finer_problem_shares_what_was_built(two_link: Ro
     assert free.finer.structure.layout.size > first.finer.structure.layout.size
     coarser = free.on(Grid.uniform(1.0, 2, by_name("galerkin-1")))
     assert coarser.finer.grid.intervals == 2
+
+
+ENDS = {
+    "at rest": (State([0.3, 0.1]), State([1.0, -1.0])),
+    "moving": (State([0.3, 0.1], [1.0, 2.0]), State([1.0, -1.0], [3.0, 4.0])),
+    "free": (State([0.3, 0.1], free=["elbow"]), State([1.0, -1.0], free_velocity="all")),
+    "turning": (State([0.3, 0.1]), State([1.0, -1.0], free_velocity=["shoulder"])),
+}
+
+
+@pytest.mark.parametrize("ends", ENDS)
+@pytest.mark.parametrize("via", [(), (Via(0.5, State([0.5, 0.5])),)])
+@pytest.mark.parametrize("order", [2, 3])
+def test_between_other_ends_it_is_the_problem_that_would_be_built_there(
+    two_link: Robot, ends: str, via: tuple[Via, ...], order: int
+) -> None:
+    effects = [Gravity(9.8), *([JerkCost(0.1)] if order == 3 else [])]
+    L = Scene(two_link, effects).effort_lagrangian()
+    ld = DiscreteLagrangian(L, Grid.uniform(1.0, 4, galerkin(2, order)))
+    limits = as_limits(two_link, {"base": "none", "v": 9.0})
+    first = TrajectoryProblem(ld, REST, State([3.0, 1.0], free_velocity="all"), limits, via)
+    known = first.structure, first.inertial_torque
+    found = first.between(*ENDS[ends])
+    anew = TrajectoryProblem(ld, *ENDS[ends], limits, via)
+    assert {*vars(anew)} <= {*vars(found)}
+    for name in ("boundary", "end_jets", "free_ends", "turns"):
+        if hasattr(anew, name):
+            np.testing.assert_array_equal(getattr(found, name), getattr(anew, name))
+    assert (found.ld, found.limits, found.clearance) == (ld, limits, None)
+    assert found.unreachable == anew.unreachable
+    assert [each.node for each in found.holds] == [each.node for each in anew.holds]
+    assert found.structure.layout.size == anew.structure.layout.size
+    assert found.inertial_torque == anew.inertial_torque != known[1]
+    with pytest.raises(InputError, match=r"goal has shape \(1,\), expected \(2,\)"):
+        first.between(REST, State([1.0]))
 
 
 def test_on_another_grid_it_is_the_problem_that_would_be_built_there(two_link: Robot) -> None:

@@ -23,6 +23,7 @@ from hovi.planning.solver.status import Status
 from hovi.planning.task_file.reading import load_task
 from hovi.planning.task_file.task import Task
 from hovi.robot.bundled_models import example
+from hovi.robot.loading import load_robot
 from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
 from hovi.schemes import galerkin
@@ -301,6 +302,24 @@ def test_within_limits_a_solve_at_its_iteration_limit_is_continued() -> None:
     assert continued.cost == pytest.approx(whole.cost, rel=1e-4)
     assert accuracy_of(continued).rounds[1].nit > 20  # of both
     assert "stopped early: the last solve ended in iteration_limit" in stopped.message
+
+
+def test_a_solve_that_halved_intervals_is_continued_on_its_own_grid() -> None:
+    """As it may within limits on torques."""
+    robot = load_robot("ur5")
+    scene, grid = Scene(robot, [Gravity(9.8)]), Grid.uniform(0.6, 6, galerkin(2))
+    ld = DiscreteLagrangian(scene.effort_lagrangian(), grid)
+    start, goal = State([0.0, -1.57, 1.57, -1.57, -1.57, 0.0]), State([1.5, -1, 1, -1.5, -1, 0.5])
+    free = solve_on_grid(TrajectoryProblem(ld, start, goal)).trajectory
+    most = 0.9 * np.abs(free.sample(np.linspace(0.0, 0.6, 101)).tau).max(axis=0)
+    limits = as_limits(robot, {"base": "none", "tau": most})
+    first = solve_on_grid(TrajectoryProblem(ld, start, goal, limits))
+    on: list[int] = []
+    found = refine_to_tolerance(
+        first, Tolerance(1e-6), max_iterations=20, on_round=lambda done: on.append(done.intervals)
+    )
+    assert found.success
+    assert on[1] > 19  # the next grid has so many
 
 
 def test_an_interrupt_after_some_grids_returns_the_most_accurate_motion(arm_scene: Scene) -> None:

@@ -140,7 +140,7 @@ def obstacle_of_kind(
     """
     kind = table.get("kind")
     if kind is None:
-        raise InputError(f"the kind is missing: {nearest('', [*kinds, *others])}")
+        raise InputError(f"an obstacle needs `kind`: {nearest('', [*kinds, *others])}")
     if not isinstance(kind, str) or kind not in kinds:
         likely = SYNONYMS.get(str(kind).lower(), str(kind))
         raise InputError(

@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.discrete.state import Periodic
-from hovi.planning.clearance.clearance_violation import distance_in_words
+from hovi.planning.clearance.clearance_violation import TOUCHING, distance_in_words
 from hovi.planning.problem.arms.limit_set import KIND_NAMES
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.goal_clearance import goal_in_obstacle
@@ -100,7 +100,7 @@ def _end_in_obstacle(problem: TrajectoryProblem) -> str:
         k = int(np.argmin(d))
         if d[k] < margin - MARGIN_TOLERANCE:
             distance = float(d[k] - problem.distances.allowance[k])
-            needed = "" if distance < 0 else f", less than the margin of {margin:g} m"
+            needed = "" if distance < TOUCHING else f", less than the margin of {margin:g} m"
             advice = f"change the {end}" + (" or move the obstacle" if pairs[k].obstacle else "")
             return f"at the {end} {pairs[k]} {distance_in_words(distance)}{needed}; {advice}"
     goals = [(problem.goal, "goal"), *((via.goal, "via point") for via in problem.via)]

@@ -14,7 +14,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from hovi.planning.clearance.clearance_violation import distance_in_words
+from hovi.planning.clearance.clearance_violation import TOUCHING, distance_in_words
 from hovi.planning.clearance.distances import Distances, Pair
 from hovi.planning.problem.frame_goal import FrameGoal
 
@@ -57,7 +57,7 @@ def goal_in_obstacle(goal: FrameGoal, name: str, distances: Distances, margin: f
     if not found or min(found.values()) >= margin:
         return ""
     pair = min(found, key=lambda each: found[each])
-    needed = "" if found[pair] < 0 else f", less than the margin of {margin:g} m"
+    needed = "" if found[pair] < TOUCHING else f", less than the margin of {margin:g} m"
     least = "" if goal.rotation is not None else " or come closer"
     apart = f"{distance_in_words(found[pair])}{least}{needed}"
     return (

@@ -200,8 +200,8 @@ class TrajectoryProblem(ProblemSummary):
         """The same problem between other states, sharing what was built for this one."""
         if isinstance(goal, State) and isinstance(self.goal, State):  # only conditions depend on it
             problem = object.__new__(type(self))
-            given = {"ld": self.ld, "limits": self.limits, "clearance": self.clearance}
-            vars(problem).update(given, start=start, goal=goal, via=self.via)
+            given = {x.name: getattr(self, x.name) for x in dataclasses.fields(self) if x.init}
+            vars(problem).update(given, start=start, goal=goal)
             problem._set_conditions(start, goal)
         else:
             problem = dataclasses.replace(self, start=start, goal=goal)

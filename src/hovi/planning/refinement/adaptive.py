@@ -124,6 +124,7 @@ def refine_to_tolerance(
 ) -> Solution:
     """Refine a solution to a tolerance; arguments as for `solve_to_tolerance`.
 
+    Within limits alone a solve at its iteration limit is continued once.
     restart: returns the solution to begin with if the given one is not near a finer one; None to
         keep the given one.
     """
@@ -260,9 +261,9 @@ class _Search:
         steps = self.max_iterations
         if last.whirl is not None:
             steps = min(steps, MAX_WORK // problem.grid.intervals)
+        taken, seconds = 0, 0.0
         # A motion would be moved out of its obstacles once more, were it not for `near`. Within
         # limits alone a solve from the guess takes fewer steps, where it ends well.
-        taken, seconds = 0, 0.0
         for near in (True,) if problem.distances is not None else (None, True):
             solution = solve_on_grid(
                 problem,
@@ -275,7 +276,8 @@ class _Search:
             )
             taken, seconds = taken + solution.nit, seconds + solution.solve_seconds
             if solution.status is Status.ITERATION_LIMIT and problem.limited:
-                guess = solution.trajectory.path  # from where it goes on
+                # continued from there, where intervals may have been halved
+                problem, guess = solution.problem or problem, solution.trajectory.path
             elif solution.status is not Status.INFEASIBLE:  # the last grid has a motion
                 break
         return dataclasses.replace(solution, nit=taken, solve_seconds=seconds)

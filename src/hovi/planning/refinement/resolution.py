@@ -280,7 +280,7 @@ class Resolution(MotionCheck):
         dq = problem.coordinates.difference(self.path.q, path.q)
         dv = problem.grid.duration * (path.v - self.path.v)
         far, more = float(max(np.abs(dq).max(), np.abs(dv).max())), 0.0
-        if far > NEARBY and far > self.largest_change:  # which small changes need not know
+        if far > NEARBY and far > self.largest_change:  # expensive: not for small changes
             return None
         if self.prices is not None:
             changes = np.abs(limit_prices(solution) - self.prices)
@@ -298,7 +298,7 @@ def _largest_estimate(problem: TrajectoryProblem) -> float:
 
 
 def _limits_alone(problem: TrajectoryProblem) -> bool:
-    """Whether limits alone restrict a motion: no obstacles, equations or segments."""
+    """Whether limits at most restrict a motion: no obstacles, equations or segments."""
     return problem.distances is None and not problem.constrained and problem.ld.segments is None
 
 

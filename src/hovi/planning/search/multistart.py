@@ -163,7 +163,8 @@ def _solve(
             barrier=job.barrier,
         )
     price = 0.0 if free is None else free.weight * solution.trajectory.duration
-    return dataclasses.replace(solution, problem=None, cost=solution.cost + price)
+    cost = solution.cost + price
+    return dataclasses.replace(solution, problem=None, model=None, cost=cost)
 
 
 @dataclass(frozen=True, eq=False)

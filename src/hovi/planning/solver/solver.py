@@ -79,7 +79,7 @@ class Solution(SolutionSummary):
     setup_seconds, solve_seconds: wall time before and during the solve. problem: what was solved.
     forces: multipliers of limits and of passive joints' torques at the quadrature points, and of
         limits at instants between them. instants: these; None for none.
-    central, model: where `replan` starts, the path of a barrier method or else the last model.
+    central, model: what `replan` starts from, the path of a barrier method or the last model.
     check: returns a replanned motion with its error estimate or as UNRESOLVED; None for no check.
     locally_infeasible: whether the violation of limits has nonzero minima from several guesses.
     """
@@ -156,8 +156,8 @@ class Solution(SolutionSummary):
     ) -> Solution:
         """The motion between other states, with this motion or another as the initial guess.
 
-        Precomputed functions are reused, for planning in a loop. The guess is the motion to first
-        order, which counts as one step: see hovi.planning.solver.warm_start.
+        Precomputed functions are reused, for planning in a loop. The guess is a first-order
+        prediction, which counts as one step: see hovi.planning.solver.warm_start.
         start, goal: as for `plan`, tables included; the goal may be Periodic, too; unchanged if
             None. A start at a frame is the configuration nearest to the old start.
         guess: an earlier solution on the same grid; this one if None. The duration is kept.
@@ -178,8 +178,8 @@ class Solution(SolutionSummary):
             old.goal if goal is None else as_goal(goal, old),
         )
         central = self.central if guess is None else None
-        of = self if guess is None else guess
-        again = _Again(problem, of.trajectory.path, central, self.check, of.model)
+        origin = self if guess is None else guess
+        again = _Again(problem, origin.trajectory.path, central, self.check, origin.model)
         if self.status is Status.STATIONARY:
             options = {"method": Stationary()} | options
         return again.within(deadline, "this is the last motion", **options)

@@ -20,13 +20,14 @@ def follow(
 ) -> DiscretePath:
     """The path between new ends, predicted to first order from a stationary path.
 
-    dx = e - H^-1 H e, with e the change of the end nodes alone and H the Hessian of the action at
-    the old path: one Newton step of the equations linearised there. Where H is not positive
-    definite, or not only the ends are fixed, a cubic takes the old ends to the new ones.
+    dx = e - H^-1 (H e + g), with e the change of the end nodes alone, and g the gradient and H the
+    Hessian of the action at the old path: one Newton step of the equations linearised there. Where
+    H is not positive definite, or not only the ends are fixed, a cubic takes the old ends to the
+    new ones.
 
-    solved: a stationary path on the problem's grid, between other ends.
-    known: the model near it with which it was found; computed at it if None, or if its unknowns are
-        not those of the problem.
+    solved: a path on the problem's grid between other ends, stationary if a model is known.
+    known: the banded model near it with which it was found; computed at it if None, or if its
+        unknowns are not those of the problem.
     """
     if not problem.plain:
         return problem.moved(solved)
@@ -39,11 +40,13 @@ def follow(
         return problem.moved(solved)
     ends = _ends(problem)
     change = _columns(objective, solved, ends)
-    residual, moved = np.zeros_like(change), [0, -1]
-    # of two intervals alone, as no other one has a column that is fixed
-    hessian = model.intervals.hessian[moved]
-    residual[moved] = np.einsum("kijab,kjb->kia", hessian, change[moved])
-    change -= model.gather(factor.solve(model.scatter(residual)))
+    residual, ends_of = np.zeros_like(change), [0, -1]  # the only intervals with fixed columns
+    hessian = model.intervals.hessian[ends_of]
+    residual[ends_of] = np.einsum("kijab,kjb->kia", hessian, change[ends_of])
+    slope = model.scatter(residual)
+    if known is None:
+        slope = slope + model.gradient
+    change -= model.gather(factor.solve(slope))
     return _with_ends(objective.moved(solved, change), ends)
 
 
@@ -66,8 +69,7 @@ def _columns(objective: ActionObjective, old: DiscretePath, ends: list[Array]) -
     change[0, :k] = nodes[0]
     change[-1, k : 2 * k] = nodes[1]
     if objective.coordinates == "regular":
-        for i in {0, len(change) - 1}:
-            change[i, : 2 * k] = regular_from_nodal(0, k) @ change[i, : 2 * k]
+        change[[0, -1], : 2 * k] = regular_from_nodal(0, k) @ change[[0, -1], : 2 * k]
     return change
 
 

@@ -14,6 +14,7 @@ from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import Grid
 from hovi.planning.problem.limits import as_limits
 from hovi.planning.problem.presolve.end_torques import held_still, unavoidable_torque
+from hovi.planning.problem.presolve.findings import about_limits
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.schemes import galerkin
 
@@ -125,6 +126,24 @@ def test_an_end_with_a_given_acceleration_has_the_torque_of_inverse_dynamics(
     ld = DiscreteLagrangian(scene.effort_lagrangian(), Grid.uniform(2.0, 2, galerkin(1, 3)))
     asked = TrajectoryProblem(ld, hovi.State(REST), hovi.State(q, v, a=a), limits)
     assert ("at the goal is" in unavoidable_torque(asked, limits)) == (share < 1)
+
+
+def test_an_end_that_cannot_be_held_is_no_fault_of_one_with_an_acceleration(
+    ur5: hovi.Robot,
+) -> None:
+    """A smooth motion ends with the acceleration that is given, be it zero."""
+    scene = hovi.Scene(ur5, [hovi.effects.Gravity(), hovi.effects.JerkCost(0.1)])
+    q = np.array([0.0, -0.3, 0.3, -1.57, -1.57, 0.0])
+    static = scene.inverse_dynamics(q[None], *np.zeros((2, 1, 6)), np.zeros(1))[0]
+    mass = pin.crba(scene.model, scene.model.createData(), q)
+    falling = np.linalg.solve(np.triu(mass) + np.triu(mass, 1).T, -0.2 * static)
+    limits = as_limits(ur5, {"base": "none", "tau": np.maximum(0.9 * np.abs(static), 5.0)}, 3)
+    ld = DiscreteLagrangian(scene.effort_lagrangian(), Grid.uniform(2.0, 2, galerkin(1, 3)))
+    for a, expected in ((falling, 0), (np.zeros(6), 1)):
+        start, goal = hovi.State(q, a=a), hovi.State(REST)
+        asked = TrajectoryProblem(ld, start, goal, limits)
+        found = about_limits(asked, start, goal)
+        assert len(found.warnings) + bool(found.reason) == expected
 
 
 @pytest.mark.parametrize(("smooth", "what"), [(False, "may not exist"), (True, "has to be zero")])

@@ -245,7 +245,7 @@ WRONG: dict[str, tuple[dict[str, Any], tuple[str, ...]]] = {
     ),
     "an obstacle without a kind": (
         UR5 | {"obstacles": [{key: value for key, value in WALL.items() if key != "kind"}]},
-        ("obstacle 'wall': the kind is missing: valid names are 'box', ",),
+        ("obstacle 'wall': an obstacle needs `kind`: valid names are 'box', ",),
     ),
     "an unknown key of an obstacle": (
         UR5 | {"obstacles": [{**WALL, "centre": [0, 0, 0]}]},

@@ -60,6 +60,8 @@ def about_limits(
         for end in (0, 1):
             what = "the motion has to begin or end with an acceleration there, and may not exist"
             if problem.ld.k > 2 and not problem.free_ends[end, 2].any():
+                if problem.end_jets[2][end].any():
+                    continue  # `contradiction` knows its torque
                 what = "its acceleration has to be zero there, so that probably no motion exists"
             warnings += [
                 f"{clause}: {what}; reduce the load, or change the ends or the limits."

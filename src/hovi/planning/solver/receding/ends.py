@@ -24,13 +24,11 @@ from hovi.planning.problem.problem import TrajectoryProblem
 
 NEAR_DISTANCE, NEAR_ANGLE = 0.1, 0.5
 """Distance in [m] and angle in [rad] from a frame goal up to which `replan` keeps the old end."""
-
-
-OF_THE_PLAN = (
+KEPT_OPTIONS = (
     *("duration", "time_weight", "tolerance", "scheme", "intervals", "limits", "via", "weight"),
-    *("smooth", "obstacles", "grasped", "margin", "self_collision", "group", "starts"),
+    *("smooth", "obstacles", "grasped", "margin", "self_collision", "group", "turns"),
 )
-"""Options of `plan` that motions planned again keep."""
+"""Options of `plan` that `replan` and `advance` keep."""
 ROOM = 5e-7
 """Distance of a start from a limit that it is at, as a share of the range: without any there would
 be no motion strictly within the limits."""
@@ -73,9 +71,9 @@ def require_known(
     solving = [*inspect.signature(solve).parameters][2:]
     own = [*inspect.signature(method).parameters][1:-1]
     for name in options:
-        if name in OF_THE_PLAN:
+        if name in KEPT_OPTIONS:
             raise InputError(
-                f"{method.__name__} keeps the {name} of the plan: to change that, call plan again."
+                f"{method.__name__} keeps `{name}` as planned: call plan again to change it."
             )
         if name not in solving:
             hint = nearest(name, {*own, *solving})
