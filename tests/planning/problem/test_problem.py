@@ -88,7 +88,8 @@ def test_between_other_ends_it_is_the_problem_that_would_be_built_there(
     for name in ("boundary", "end_jets", "free_ends", "turns"):
         if hasattr(anew, name):
             np.testing.assert_array_equal(getattr(found, name), getattr(anew, name))
-    assert (found.ld, found.limits, found.clearance) == (ld, limits, None)
+    assert (found.ld, found.start, found.goal) == (ld, *ENDS[ends])
+    assert (found.limits, found.via, found.clearance) == (limits, via, None)
     assert found.unreachable == anew.unreachable
     assert [each.node for each in found.holds] == [each.node for each in anew.holds]
     assert found.structure.layout.size == anew.structure.layout.size

@@ -307,7 +307,7 @@ def test_within_limits_a_solve_at_its_iteration_limit_is_continued() -> None:
 def test_a_solve_that_halved_intervals_is_continued_on_its_own_grid() -> None:
     """As it may within limits on torques."""
     robot = load_robot("ur5")
-    scene, grid = Scene(robot, [Gravity(9.8)]), Grid.uniform(0.6, 6, galerkin(2))
+    scene, grid = Scene(robot, [Gravity()]), Grid.uniform(0.6, 6, galerkin(2))
     ld = DiscreteLagrangian(scene.effort_lagrangian(), grid)
     start, goal = State([0.0, -1.57, 1.57, -1.57, -1.57, 0.0]), State([1.5, -1, 1, -1.5, -1, 0.5])
     free = solve_on_grid(TrajectoryProblem(ld, start, goal)).trajectory
