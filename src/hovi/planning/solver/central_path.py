@@ -18,6 +18,7 @@ from hovi.robot.space.coordinates import Coordinates
 from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
+Mask = npt.NDArray[np.bool_]
 
 FARTHEST = 0.1
 """Largest change of q from a point of a central path to its solution, in [rad] or [m], with which a
@@ -105,6 +106,15 @@ class CentralPath:
             for level, path in self.points
         )
         return CentralPath(points, None, conditions=self.conditions)
+
+    def between(self, free_ends: Mask) -> CentralPath:
+        """The same, without rows and multipliers if ends are free that were not, or the reverse.
+
+        free_ends: see LimitRows.
+        """
+        if self.rows is None or np.array_equal(self.rows.free_ends, free_ends):
+            return self
+        return CentralPath(self.points, None)
 
     def freed(self) -> CentralPath:
         """The same with rows that may be refined."""

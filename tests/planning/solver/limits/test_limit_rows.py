@@ -69,7 +69,8 @@ def rows_of(
     problem: TrajectoryProblem, fixed_ends: tuple[bool, bool] = (False, False)
 ) -> LimitRows:
     assert problem.limits is not None
-    return LimitRows(problem.grid, problem.limits, problem.coordinates.curved_space, fixed_ends)
+    free = np.broadcast_to(~np.array(fixed_ends)[:, None, None], problem.free_ends.shape)
+    return LimitRows(problem.grid, problem.limits, problem.coordinates.curved_space, free)
 
 
 def with_rows(problem: TrajectoryProblem) -> LimitRows:
@@ -177,6 +178,22 @@ def test_torques_have_no_rows() -> None:
     rows = rows_of(problem)
     assert rows.size == len(rows.of.order) == 0
     assert rows.refine(wavy(problem, 1.0), 0.0) is None
+
+
+@pytest.mark.parametrize("end", [0, 1])
+@pytest.mark.parametrize(("free", "missing"), [((0, 0), 3), ((0, 1), 1), ((1, 0), 1), ((1, 1), 0)])
+def test_what_an_end_leaves_free_has_rows(end: int, free: tuple[int, int], missing: int) -> None:
+    """Of q two, and of v one control point are given by q and v; without v one of q, without q one
+    of v."""
+    problem = problem_of("two_link", GRIDS["one scheme"])
+    every = rows_of(problem)
+    assert problem.limits is not None
+    mask = np.ones((2, 2, 2), dtype=bool)
+    mask[end, :, 1] = free  # the elbow
+    rows = LimitRows(problem.grid, problem.limits, None, mask)
+    assert {0, 1} <= {*every.orders}
+    assert every.size - rows.size == missing
+    assert (rows.joints == 0).sum() == (every.joints == 0).sum()
 
 
 @pytest.mark.parametrize("fixed_ends", [(True, False), (False, True)])
@@ -347,7 +364,8 @@ def test_where_limits_change_both_intervals_bound_the_node(two_link: hovi.Robot)
     parts = [as_limits(two_link, {"base": "none", "v": v}) for v in (2.0, 1.0)]
     problem = problem_of("two_link", GRIDS["one scheme"])
     same = rows_of(problem_of("two_link", GRIDS["one scheme"], {"base": "none", "v": 2.0}))
-    rows = LimitRows(problem.grid, Limits.of_segments(parts, [0.5]), None, (False, False))
+    free = np.ones((2, 2, 2), dtype=bool)
+    rows = LimitRows(problem.grid, Limits.of_segments(parts, [0.5]), None, free)
     assert rows.size == same.size + 2
     at_node = positions(rows)[:, 3] == 0.0
     assert sorted(rows.intervals[at_node]) == [0, 0, 2, 2]
@@ -463,7 +481,7 @@ def test_solutions_lose_no_more_than_what_they_promise(two_link: hovi.Robot) -> 
     problem = TrajectoryProblem(ld, State([0.0, 0.0]), State([1.5, -1.8]), limits=limits)
     found = solve_on_grid(problem)
     assert found.success
-    fine = LimitRows(grid, limits, None, (True, True), (8, 8))
+    fine = LimitRows(grid, limits, None, None, (8, 8))
     objective = BoundedAction(problem, limits, rows=fine)
     start = guess_path(problem, found.trajectory)
     exact = minimize_bounded(objective, start, Options(decrease=1e-10))

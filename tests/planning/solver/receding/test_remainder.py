@@ -139,7 +139,7 @@ def test_rows_are_those_of_the_same_parts(base: str, time: float) -> None:
     path, remainder = wavy(problem), Remainder.after(GRID, time)
     rest = remainder.path(path, problem)
     assert problem.limits is not None
-    rows = LimitRows(GRID, problem.limits, problem.coordinates.curved_space, (True, True), (1, 2))
+    rows = LimitRows(GRID, problem.limits, problem.coordinates.curved_space, None, (1, 2))
     rows._halve(np.arange(len(rows.parts)) % 3 == 0, np.arange(rows.size))
     left, kept = remainder.rows(rows)
     later = left.intervals > 0
@@ -162,7 +162,7 @@ def test_values_of_rows_enclose_those_of_the_rest() -> None:
     path = wavy(problem)
     rest = remainder.path(path, problem)
     assert problem.limits is not None
-    left, _ = remainder.rows(LimitRows(GRID, problem.limits, None, (False, False)))
+    left, _ = remainder.rows(LimitRows(GRID, problem.limits, None, np.ones((2, 2, 2), dtype=bool)))
     motion = rest_of(problem, remainder).trajectory(rest)
     jet = motion.jet_intervals(np.zeros(200, np.intp), np.linspace(0.0, 1.0, 200))
     for c, (order, joint) in enumerate(zip(left.of.order, left.of.joint, strict=True)):

@@ -56,7 +56,8 @@ class LimitRows:
     """Rows on a grid: y = x / range of the control points of limited coordinates, between bounds.
 
     grid: on which they are. limits: imposed. space: of the configurations; None for a vector space.
-    fixed_ends: whether the start and the goal are given, and with them the control points there.
+    free_ends: which of (q, q', ..., q^(k-1)) are free at the start and at the goal, (2, k, nv); all
+        are given if None. A control point that is given with an end has no row.
     halvings: of all intervals for the control points of positions, and for those of derivatives.
     barrier: the last barrier parameter, relative to the mean density of the cost.
 
@@ -74,13 +75,14 @@ class LimitRows:
         grid: Grid,
         limits: Limits,
         space: ConfigurationSpace | None,
-        fixed_ends: tuple[bool, bool] = (True, True),
+        free_ends: Mask | None = None,
         halvings: tuple[int, int] = (0, 0),
         barrier: float = 0.0,
     ) -> None:
         self.grid = grid
         self.space = space
-        self.fixed_ends = fixed_ends
+        shape = 2, grid.order, limits.lower.shape[1]
+        self.free_ends = np.zeros(shape, dtype=bool) if free_ends is None else free_ends
         self.limits = limits
         self.fixed = False
         self._instants: tuple[Grid, Instants] | None = None
@@ -261,13 +263,16 @@ class LimitRows:
         limits than the one before to both.
         """
         degree = control_degree(self.grid.order, self.grid.inner_modes, order)
-        smooth = self.grid.order - order  # values and derivatives that are given at an end
+        # the derivatives from this one on that are given at an end determine as many points there
+        given = np.cumprod(~self.free_ends[:, order:], axis=1).sum(axis=1)  # (2, nv)
+        at_end = given[:, self.of.joint[parts.coordinate]]
         at_start = (parts.k == 0) & (parts.left == 0)
-        at_node = np.where(self.of.differ(parts.k, parts.coordinate), 0, min(smooth, 1))
+        smooth = order < self.grid.order
+        at_node = np.where(self.of.differ(parts.k, parts.coordinate), 0, int(smooth))
         before = np.where(at_start, 0, np.where(parts.left > 0, min(degree, 1), at_node))
-        first = np.where(at_start & self.fixed_ends[0], smooth, before)
+        first = np.where(at_start, at_end[0], before)
         at_goal = (parts.k == self.grid.intervals - 1) & (parts.left + parts.width == 1)
-        last = degree - np.where(at_goal & self.fixed_ends[1], smooth, 0)
+        last = degree - np.where(at_goal, at_end[1], 0)
         i = np.arange(degree + 1)
         return np.asarray((i >= first[:, None]) & (i <= last[:, None]))
 

@@ -10,7 +10,6 @@ import numpy.typing as npt
 
 from hovi.discrete.grid import DiscretePath
 from hovi.discrete.instants import Instants
-from hovi.discrete.state import State
 from hovi.optimize.banded_model import BandModel
 from hovi.optimize.barrier import INITIAL_MARGIN, WARM_START_MARGIN, Barrier
 from hovi.optimize.bordered_model import EquationModel
@@ -116,6 +115,7 @@ class BoundedSearch:
         self.margins = self.no_margins()
         if self.along is not None and not self.along.fits(self.problem.grid):
             self.along = None  # a round before has halved intervals
+        self.along = self.along and self.along.between(self.problem.free_ends)
         known = None if self.along is None else self.along.rows
         self.rows = self.coarse_rows() if known is None else known.copied()
         self.tightened: tuple[Array, Array] | None = None
@@ -148,10 +148,9 @@ class BoundedSearch:
 
     def _rows(self, halvings: tuple[int, int]) -> LimitRows:
         problem = self.problem
-        given = isinstance(problem.start, State), isinstance(problem.goal, State)
-        space = problem.coordinates.curved_space
-        barrier = self.options.barrier
-        return LimitRows(problem.grid, self.limits, space, given, halvings, barrier)
+        space, barrier = problem.coordinates.curved_space, self.options.barrier
+        free = problem.free_ends
+        return LimitRows(problem.grid, self.limits, space, free, halvings, barrier)
 
     def no_near_rows(self) -> ClearanceRows:
         """No rows of distances yet."""
