@@ -133,6 +133,8 @@ def test_bad_goals_are_refused_in_one_sentence(ur5: Robot) -> None:
         ({"rotation": np.eye(3), "axis": ([0, 0, 1], [0, 0, 1])}, "not both"),
         ({"pose": np.eye(3)}, r"\(4, 4\).*for a rotation alone write rotation="),
         ({"pose": np.zeros(3)}, "for a position alone write position="),
+        ({"pose": np.zeros(6)}, "for three angles write position=..., rpy="),
+        ({"pose": np.zeros(7)}, "for a quaternion write position=..., quaternion_xyzw="),
         ({"pose": np.eye(5)}, r"\(5, 5\)\.$"),
         (
             {"position": [0, 0, 0], "quaternion": [1, 0, 0, 0]},

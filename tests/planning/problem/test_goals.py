@@ -176,6 +176,15 @@ def test_two_via_points_may_share_a_time(arm_scene: hovi.Scene) -> None:
     np.testing.assert_allclose(solution.trajectory.sample(0.5).q[0], [-0.5, 0.4], atol=1e-9)
 
 
+def test_a_configuration_alone_is_a_via_point(arm_scene: hovi.Scene) -> None:
+    for q in ([-0.5, 0.4], np.array([-0.5, 0.4])):
+        via = hovi.Via(0.5, q)  # type: ignore[arg-type]
+        assert isinstance(via.goal, hovi.State)
+    solution = hovi.plan(arm_scene, [-1.5, 0.0], [0.3, 0.7], 1.0, via=[via], limits="none")
+    np.testing.assert_allclose(solution.trajectory.sample(0.5).q[0], [-0.5, 0.4], atol=1e-9)
+    assert np.abs(solution.trajectory.sample(0.5).v).max() > 0.1
+
+
 def test_bad_goals_and_via_points_are_refused() -> None:
     task = hovi.load_task(hovi.example("ur5_reach"))
     scene, start, goal = task.scene, task.start, task.goal
@@ -188,7 +197,7 @@ def test_bad_goals_and_via_points_are_refused() -> None:
     with pytest.raises(InputError, match="must be positive"):
         hovi.Via(-1.0, goal)
     with pytest.raises(InputError, match=r"must be a hovi.State.q. or a hovi.FrameGoal"):
-        hovi.Via(1.0, [0.0] * 6)  # type: ignore[arg-type]
+        hovi.Via(1.0, 0.5)  # type: ignore[arg-type]
 
 
 def test_goals_survive_scene_files(tmp_path, models) -> None:

@@ -35,8 +35,13 @@ MAX_ANGLE_ERROR = 1e-6
 """Angle in [rad] above which a frame whose equations hold is half a turn away from its goal."""
 _TURNS = ("rotation", *ORIENTATIONS, "axis")
 """What a frame goal says of its orientation: one of them at most."""
-_PARTS_OF_POSE = {(3,): "position", (3, 3): "rotation"}
-"""Parts of a pose that have arguments of their own, by their shapes."""
+_OTHER_POSES = {
+    (3,): "for a position alone write position=...",
+    (3, 3): "for a rotation alone write rotation=...",
+    (6,): "for three angles write position=..., rpy=...",
+    (7,): "for a quaternion write position=..., quaternion_xyzw=... or quaternion_wxyz=...",
+}
+"""What to write for numbers of another shape than that of a pose."""
 ORTHONORMALITY_TOLERANCE = 1e-6
 """Largest deviation of a rotation matrix from orthonormality, and smallest length of an axis."""
 
@@ -104,10 +109,10 @@ class FrameGoal:
                 )
             matrix = _numbers("pose", getattr(self.pose, "homogeneous", self.pose))
             if matrix.shape != (4, 4):
-                part = _PARTS_OF_POSE.get(matrix.shape)
-                hint = f"; for a {part} alone write {part}=..." if part else ""
+                hint = _OTHER_POSES.get(matrix.shape)
                 raise InputError(
-                    f"a pose must be a matrix of shape (4, 4), got {matrix.shape}{hint}."
+                    f"a pose must be a matrix of shape (4, 4), got {matrix.shape}"
+                    + (f"; {hint}" if hint else ".")
                 )
             if not np.array_equal(matrix[3], [0.0, 0.0, 0.0, 1.0]):
                 raise InputError(f"the last row of a pose must be 0, 0, 0, 1, got {matrix[3]}.")

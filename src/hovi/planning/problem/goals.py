@@ -34,8 +34,8 @@ class Via:
     """A via point: a goal that the motion meets at a given time.
 
     time: in [s]; a text such as "500 ms" is converted.
-    goal: a State, whose velocity is free if none is given, or a FrameGoal, which leaves all
-        velocities free.
+    goal: a State, whose velocity is free if none is given, or its configuration alone; or a
+        FrameGoal, which leaves all velocities free.
     Raises InputError for a time that is not positive, or another kind of goal.
     """
 
@@ -43,6 +43,8 @@ class Via:
     goal: State | FrameGoal
 
     def __post_init__(self) -> None:
+        if isinstance(self.goal, np.ndarray | list | tuple):
+            object.__setattr__(self, "goal", State(self.goal))
         if not isinstance(self.goal, State | FrameGoal):
             raise InputError(
                 f"the goal of a via point must be a hovi.State(q) or a hovi.FrameGoal, got "

@@ -41,6 +41,7 @@ from hovi.planning.solver.receding.ends import (
     first_state,
     inside_limits,
     is_near,
+    measured,
     require_known,
 )
 from hovi.planning.solver.receding.last_motion import last_motion, meets
@@ -225,8 +226,7 @@ class Solution(SolutionSummary):
         path = shift.path(self.trajectory.path)
         state = first_state(path)
         if start is not None:
-            given = as_start(start, old)
-            state = given if given.a is not None else dataclasses.replace(given, a=state.a)
+            state = measured(start, old, state)
         to = old.goal if goal is None else as_goal(goal, old)
         assert not isinstance(to, Periodic)
         problem = shift.between(inside_limits(state, old), to)

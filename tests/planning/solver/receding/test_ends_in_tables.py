@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import warnings
 from typing import Any
 
 import numpy as np
@@ -94,6 +95,16 @@ def test_what_is_no_goal_gets_the_sentence_of_plan(
     assert str(told.value) == str(by_plan.value)
 
 
+def test_a_measured_configuration_without_a_velocity_is_warned_of(planned: hovi.Solution) -> None:
+    passed = planned.trajectory.sample(np.array([0.7]))
+    with pytest.warns(hovi.errors.HoviWarning, match=r"passes at up to .* give hovi.State\(q, v\)"):
+        planned.advance(0.7, passed.q[0])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        planned.advance(0.7, hovi.State(passed.q[0], passed.v[0]))
+        planned.advance(0.7)
+
+
 def test_what_motions_planned_again_keep_are_options_of_plan() -> None:
     known = {*inspect.signature(hovi.plan).parameters, *inspect.signature(PlanOptions).parameters}
     assert set(KEPT_OPTIONS) <= known
@@ -108,6 +119,8 @@ def test_an_option_that_does_not_exist_is_named(planned: hovi.Solution) -> None:
         planned.replan(duration=1.0)
     with pytest.raises(InputError, match=r"advance keeps `limits` as planned"):
         planned.advance(0.1, limits="none")
+    with pytest.raises(InputError, match="replan has no option 'near'"):
+        planned.replan(near=True)
     assert planned.replan(max_iterations=50, escape_saddles=False).success
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from hovi.discrete.grid import DiscretePath
 from hovi.discrete.state import Periodic, State
-from hovi.errors import InputError, nearest
+from hovi.errors import InputError, nearest, warn
 from hovi.planning.clearance.clearance import Clearance
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.inverse_kinematics import (
@@ -24,11 +24,14 @@ from hovi.planning.problem.problem import TrajectoryProblem
 
 NEAR_DISTANCE, NEAR_ANGLE = 0.1, 0.5
 """Distance in [m] and angle in [rad] from a frame goal up to which `replan` keeps the old end."""
+NEARLY_AT_REST = 0.05
+"""Velocity, in [rad/s] or [m/s], up to which a motion is taken as at rest."""
 KEPT_OPTIONS = (
     *("duration", "time_weight", "tolerance", "scheme", "intervals", "limits", "via", "weight"),
     *("smooth", "obstacles", "grasped", "margin", "self_collision", "group", "turns"),
+    *("starts", "continuation", "processes"),
 )
-"""Options of `plan` that `replan` and `advance` keep."""
+"""Options of `plan` that `replan` and `advance` keep, or have no use for."""
 ROOM = 5e-7
 """Distance of a start from a limit that it is at, as a share of the range: without any there would
 be no motion strictly within the limits."""
@@ -68,7 +71,7 @@ def require_known(
     """Raise InputError for options that neither a method of a solution nor a solve has."""
     if not options:
         return
-    solving = [*inspect.signature(solve).parameters][2:]
+    solving = [name for name in [*inspect.signature(solve).parameters][2:] if name != "near"]
     own = [*inspect.signature(method).parameters][1:-1]
     for name in options:
         if name in KEPT_OPTIONS:
@@ -83,6 +86,22 @@ def require_known(
 def first_state(path: DiscretePath) -> State:
     """The state that a path starts in."""
     return State(path.q[0], **dict(zip(("v", "a", "jerk"), path.rates[0], strict=False)))
+
+
+def measured(given: End, problem: TrajectoryProblem, passed: State) -> State:
+    """The state measured where a motion passes one; with its acceleration if none is given.
+
+    Warns of one that is given without a velocity, which means at rest, where the motion is not.
+    Raises as `as_start` does.
+    """
+    start = as_start(given, problem)
+    fastest = float(np.max(np.abs(passed.on(problem.coordinates, "start")[1]), initial=0.0))
+    if start.v is None and not start.free_velocity and fastest > NEARLY_AT_REST:
+        warn(
+            f"the state is given without a velocity, that is at rest, where the motion passes at "
+            f"up to {fastest:.3g} per second: give hovi.State(q, v)."
+        )
+    return start if start.a is not None else dataclasses.replace(start, a=passed.a)
 
 
 def inside_limits(state: State, problem: TrajectoryProblem) -> State:
