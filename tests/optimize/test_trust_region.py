@@ -23,6 +23,8 @@ from hovi.optimize.trust_region import (
 
 Array = npt.NDArray[np.float64]
 
+EXACT = Options(decrease=1e-9, exact=True)
+
 
 @dataclass(frozen=True)
 class DenseFactor:
@@ -540,3 +542,25 @@ def test_a_direction_without_a_positive_length_is_an_arithmetic_error(
     monkeypatch.setattr(DenseModel, "metric_product", lambda self, s: -np.asarray(s))
     with pytest.raises(ArithmeticError, match="singular to rounding"):
         solve_subproblem(model, 1.0, 0.0)
+
+
+def test_slow_convergence_to_a_degenerate_minimum_goes_on() -> None:
+    """Newton steps leave two thirds of the distance, and a fifth of the decrease."""
+    found = minimize(objective(1, lambda x: 1 + (x - 3) ** 4), np.array([1.0]), EXACT)
+    assert found.stop is Stop.STATIONARY
+    assert abs(found.x[0] - 3.0) < 2e-3
+    assert found.value - 1.0 < 1e-12
+
+
+def test_values_that_rise_by_rounding_errors_do_not_stall() -> None:
+    class Rising(Smooth):
+        """Every value is a little larger than the last one, by less than noise."""
+
+        def value(self, x: Array) -> float:
+            return 1.0 + 1e-15 * len(self.values) + 0.0 * super().value(x)
+
+    x = ca.SX.sym("x", 1)
+    options = Options(max_iterations=8, radius=1e-12)
+    found = minimize(Rising(x, 1e-4 * x**2), np.array([1.0]), options)
+    assert found.value > 1.0 + 5e-15
+    assert found.stop is Stop.ITERATION_LIMIT

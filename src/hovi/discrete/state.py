@@ -68,6 +68,10 @@ class State:
         for key in _FREE:
             if isinstance(getattr(self, key), str):
                 object.__setattr__(self, key, (getattr(self, key),))
+        for key in ("q", "v", "a", "jerk"):
+            given = getattr(self, key)
+            if isinstance(given, np.ndarray):  # which may change later
+                object.__setattr__(self, key, given.copy())
         if not isinstance(self.turns, Mapping):
             raise InputError(
                 "turns are given by joint, such as {'wrist': 1} or {'root_joint': [0, 0, 1]}, not "

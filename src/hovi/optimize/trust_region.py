@@ -39,8 +39,9 @@ EXACT_MODEL_DECREASE = 1e-5
 """Relative decrease of a Newton step below which models are exact, if Options.exact."""
 SIZE_TEST_LENGTH = 1e-4
 """Step length, relative to the first radius, up to which the relative size is evaluated."""
-LAST_DECREASE = 1e-14
-"""Relative predicted decrease below which an exact Newton step is the last in any case."""
+LAST_DECREASE, SLOWEST = 1e-14, 0.7
+"""Relative predicted decrease below which an exact Newton step is the last in any case, and ratio
+of successive ones above which steps do not converge."""
 STALLED_STEPS = 5
 """See Options.stalled."""
 
@@ -237,8 +238,8 @@ def _iterate(
             outcome.stop, outcome.convex, outcome.model = Stop.STATIONARY, exact, model
             return
         values.append(outcome.value)
-        gained = values[0] - values[-1]
-        if len(values) > STALLED_STEPS and gained < options.stalled * abs(values[0]):
+        gained, enough = values[0] - values[-1], options.stalled * abs(values[0])
+        if len(values) > STALLED_STEPS and gained < enough and enough > 0.0:
             outcome.stop = Stop.STALLED
             return
         shift = next_shift(trial.shift, trial.norm, radius)
@@ -276,14 +277,15 @@ def _is_last(
     """Whether the Newton step from a stationary point is accurate enough to be the last one.
 
     The decrease that remains after it is decrease^3 / before^2 by quadratic convergence; where
-    convergence is slower, rounding dominates. See Options.exact.
+    there is no convergence, rounding dominates. See Options.exact.
     exact: whether the model is exact. before: predicted decrease of the previous step, infinite
         if that was not a Newton step.
     """
     size, decrease = abs(outcome.value), trial.decrease
     if not options.exact or not exact:
         return not options.exact
-    if decrease <= LAST_DECREASE * size or decrease > min(options.decrease * size, 0.1 * before):
+    most = min(options.decrease * size, SLOWEST * before)
+    if decrease <= LAST_DECREASE * size or decrease > most:
         return True
     return before < math.inf and decrease * (decrease / before) ** 2 <= REMAINING_DECREASE * size
 
@@ -320,11 +322,9 @@ class _ShiftSearch:
     """Bracket and safeguarded Newton iteration on 1/|s(shift)| = 1/radius."""
 
     def __init__(self, model: QuadraticModel, radius: float, guess: float) -> None:
-        self.model = model
-        self.radius = radius
+        self.model, self.radius = model, radius
         self.low, self.high = 0.0, math.inf
-        self.indefinite = False
-        self.reached = guess > 0.0
+        self.indefinite, self.reached = False, guess > 0.0
 
     def after_failure(self, shift: float) -> float:
         """The next shift where H + shift D is not positive definite."""

@@ -675,6 +675,15 @@ def test_a_warm_start_evaluates_nothing_where_the_last_model_is_known(
     np.testing.assert_array_equal(known.q, computed.q)
 
 
+def test_a_goal_does_not_change_with_the_array_that_it_came_from(arm_scene: Scene) -> None:
+    goal = REACH_Q + 0.05
+    again = solve_on_grid(problem_on(arm_scene)).replan(goal=goal)
+    wanted = goal.copy()
+    goal += 1.0
+    moved = again.replan(start=State(HANG + 0.01))
+    np.testing.assert_array_equal(moved.trajectory.q[-1], wanted)
+
+
 def test_a_motion_is_replanned_nearby_with_a_single_hessian(
     arm_scene: Scene, monkeypatch: pytest.MonkeyPatch
 ) -> None:
