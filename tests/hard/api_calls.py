@@ -571,7 +571,10 @@ def _plans() -> list[Call]:
             *(solution(), "replan", {"q": [0.0, 0.0]}, {"shoulder": 0.3, "elbow": 0.6}),
             **{"time_limit": "1 s", "max_iterations": 2},
         ),
-        own(solution(), "advance", 0.1, [0.05, 0.1], [0.3, 0.6], duration=0.8, time_limit=1.0),
+        own(
+            *(solution(), "advance", 0.1, {"q": [0.05, 0.1], "v": [0.1, 0.1]}, [0.3, 0.6]),
+            **{"duration": 0.8, "time_limit": 1.0},
+        ),
         own(solution(), "margins"),
         build(hovi.LimitMargins, names=("a", "b"), margin=np.zeros((4, 2)), limits=limits),
         build(hovi.Margins, limits=None, distance=0.1, segments={}),
@@ -598,7 +601,7 @@ def _orders() -> list[Call]:
         call(hovi.solve, third, found.trajectory, seek="minimum"),
         call(hovi.solve, hovi.TrajectoryProblem(first, *ends), "cubic", seek="stationary"),
         own(found, "replan", None, [0.3, 0.6]),
-        own(found, "advance", 0.1, rest, [0.3, 0.6], duration=None),
+        own(found, "advance", 0.01, rest, [0.3, 0.6], duration=None),
         own(found.trajectory, "jet", [0.0, 0.5], 3),
         own(found.trajectory, "jet_intervals", [0, 1], [0.0, 1.0], 3),
         build(

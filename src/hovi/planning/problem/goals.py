@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.checks.arguments import check_arguments_except
+from hovi.checks.shapes import numbers_of
 from hovi.discrete.state import ALL, State
 from hovi.errors import InputError
 from hovi.planning.problem.frame_goal import FrameGoal
@@ -44,7 +45,8 @@ class Via:
 
     def __post_init__(self) -> None:
         if isinstance(self.goal, np.ndarray | list | tuple):
-            object.__setattr__(self, "goal", State(self.goal))
+            q = numbers_of("the goal of a via point", self.goal)
+            object.__setattr__(self, "goal", State(q))
         if not isinstance(self.goal, State | FrameGoal):
             raise InputError(
                 f"the goal of a via point must be a hovi.State(q) or a hovi.FrameGoal, got "

@@ -93,7 +93,9 @@ def solve_by_continuation(
         best = _better(best, found)
         if run.ended is not None:
             best = dataclasses.replace(best, status=run.ended)
-            return _with_sentence(best, f"Continuation in {name} was ended by {run.ended}.")
+            cut = run.ended is Status.INTERRUPTED
+            how = "was interrupted" if cut else "reached the time limit"
+            return _with_sentence(best, f"Continuation in {name} {how}.")
     sentence = f"Continuation in {', '.join(tried)} found no minimum." if tried else ""
     return _with_sentence(best, sentence)
 
