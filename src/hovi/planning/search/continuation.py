@@ -93,9 +93,7 @@ def solve_by_continuation(
         best = _better(best, found)
         if run.ended is not None:
             best = dataclasses.replace(best, status=run.ended)
-            cut = run.ended is Status.INTERRUPTED
-            how = "was interrupted" if cut else "reached the time limit"
-            return _with_sentence(best, f"Continuation in {name} {how}.")
+            return _with_sentence(best, f"Continuation in {name} {how_ended(run.ended)}.")
     sentence = f"Continuation in {', '.join(tried)} found no minimum." if tried else ""
     return _with_sentence(best, sentence)
 
@@ -192,6 +190,11 @@ def _better(best: Solution, found: Solution | None) -> Solution:
     if found is None or found.status in UNUSABLE:
         return best
     return found if best.status in UNUSABLE or found.cost < best.cost else best
+
+
+def how_ended(status: Status) -> str:
+    """What ended a search, a status of STOPPED, as a predicate."""
+    return "was interrupted" if status is Status.INTERRUPTED else "reached the time limit"
 
 
 def _with_sentence(solution: Solution, sentence: str) -> Solution:

@@ -20,7 +20,7 @@ import numpy as np
 
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError
-from hovi.planning.search.continuation import STOPPED
+from hovi.planning.search.continuation import STOPPED, how_ended
 from hovi.planning.solver.solver import Solution
 from hovi.planning.solver.status import Status
 from hovi.system.dataclass import dataclass
@@ -387,5 +387,4 @@ def _jumps(a: _Trial, b: _Trial) -> bool:
 
 def ended_search(status: Status) -> str:
     """Why a search ended, as a clause."""
-    what = "was interrupted" if status is Status.INTERRUPTED else "reached the time limit"
-    return f"the search for the best duration {what}"
+    return f"the search for the best duration {how_ended(status)}"

@@ -10,6 +10,7 @@ from hovi.optimize.banded_model import BandModel
 from hovi.optimize.quadratic_model import QuadraticModel
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.action_objective import ActionObjective
+from hovi.planning.solver.free_duration.timed_path import columns_of_ends
 from hovi.schemes.scheme import regular_from_nodal
 
 Array = npt.NDArray[np.float64]
@@ -65,9 +66,7 @@ def _columns(objective: ActionObjective, old: DiscretePath, ends: list[Array]) -
     dq = problem.coordinates.difference(old.q[[0, -1]], ends[0])
     rates = [new - old.rates[[0, -1], j] for j, new in enumerate(ends[1:])]
     nodes = np.stack([dq, *rates], axis=1) * (h[:, None] ** np.arange(k))[:, :, None]
-    change = np.zeros((problem.grid.intervals, problem.ld.columns, dq.shape[1]))
-    change[0, :k] = nodes[0]
-    change[-1, k : 2 * k] = nodes[1]
+    change = columns_of_ends(nodes, problem)
     if objective.coordinates == "regular":
         change[[0, -1], : 2 * k] = regular_from_nodal(0, k) @ change[[0, -1], : 2 * k]
     return change
