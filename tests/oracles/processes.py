@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from contextlib import suppress
 from pathlib import Path
 
 PROC = Path("/proc")
 SECONDS = 60.0
+_LISTEN = "0A"
 
 
 def is_running(pid: int) -> bool:
@@ -39,6 +41,41 @@ def children(pid: int) -> list[int]:
                 continue
             if parent == pid:
                 found.append(int(folder.name))
+    return found
+
+
+def descendants(pid: int) -> list[int]:
+    """The running children of a process, theirs, and so on."""
+    found = children(pid)
+    return [*found, *(each for child in found for each in descendants(child))]
+
+
+def arguments(pid: int) -> list[str]:
+    """The command line of a process; empty for one that has ended."""
+    try:
+        return (PROC / str(pid) / "cmdline").read_text().split("\0")
+    except OSError:
+        return []
+
+
+def listening_addresses(pids: Iterable[int]) -> list[str]:
+    """Addresses of TCP on which processes listen, in hexadecimal digits as in /proc/net/tcp."""
+    sockets = {f"socket:[{row[9]}]": row[1] for row in _tcp_rows() if row[3] == _LISTEN}
+    return [sockets[link] for pid in pids for link in _links(pid) if link in sockets]
+
+
+def _tcp_rows() -> list[list[str]]:
+    tables = [PROC / "net" / name for name in ("tcp", "tcp6")]
+    return [line.split() for path in tables for line in path.read_text().splitlines()[1:]]
+
+
+def _links(pid: int) -> list[str]:
+    """What the open descriptors of a process are."""
+    found = []
+    with suppress(OSError):
+        for each in (PROC / str(pid) / "fd").iterdir():
+            with suppress(OSError):
+                found.append(os.readlink(each))
     return found
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,13 @@ from hovi.discrete.trajectory import Trajectory
 from hovi.errors import DisplayError, HoviWarning, InputError
 from hovi.exchange.film import headless_browser
 from hovi.exchange.film.pictures import SIZE
+from oracles.processes import (
+    arguments,
+    descendants,
+    is_running,
+    listening_addresses,
+    wait_until,
+)
 from samples.cubic_motion import cubic_motion
 
 with_browser = pytest.mark.skipif(headless_browser.browser() is None, reason="needs Chromium")
@@ -68,6 +76,18 @@ def test_without_a_browser_the_robot_is_drawn_by_bars(
     found, _ = pictures_of(tmp_path / "motion.gif")
     assert len(found) == 5
     assert changed(found[0], found[-1]) > 0.002
+
+
+@with_browser
+def test_no_other_user_can_drive_the_browser_that_films(motion: Trajectory) -> None:
+    with headless_browser.headless_tab(SIZE) as tab:
+        assert tab.value("1 + 1") == 2
+        browsers = descendants(os.getpid())
+        assert len(browsers) >= 2
+        assert listening_addresses(browsers) == []
+        given = {argument for pid in browsers for argument in arguments(pid)}
+        assert not any(each.startswith("--remote-debugging-port") for each in given)
+    wait_until(lambda: not any(map(is_running, browsers)))
 
 
 def test_a_browser_that_does_not_start_is_told(
