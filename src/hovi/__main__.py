@@ -10,7 +10,7 @@ import sys
 import time
 from _thread import interrupt_main, start_new_thread
 from collections.abc import Iterator
-from types import FrameType
+from types import FrameType, TracebackType
 from typing import TextIO
 
 EXIT_INTERRUPTED = 130
@@ -23,8 +23,6 @@ NEW_OBJECTS = 200_000
 a tenth of its time: what it imports stays."""
 INTERRUPTION_MODULE = "hovi.system.interruption"
 """The module that records interrupts raised where Python drops exceptions, as in a destructor."""
-WEAK_REFERENCES = "weakref", "_weakrefset"
-"""Modules whose functions Python calls when an object goes; it drops their exceptions."""
 RETRY_DELAY = 0.05
 """Delay in [s] before Ctrl-C is raised again, if it came during an import within a run."""
 
@@ -36,7 +34,7 @@ def run() -> None:
     # No plugin of another package changes what a scene file says, and none is searched for.
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # not in the background
-        signal.signal(signal.SIGINT, _handle_interrupt)
+        handle_interrupts()
     try:
         from hovi.cli.application import main
 
@@ -61,11 +59,36 @@ def run() -> None:
     sys.exit(code)
 
 
+def handle_interrupts() -> None:
+    """Handle Ctrl-C as below, and raise it again where Python drops it.
+
+    That is so in destructors, callbacks of weak references and compiled functions that cannot
+    raise, such as the one that loads SciPy's tables for Sobol points.
+    """
+    signal.signal(signal.SIGINT, _handle_interrupt)
+    sys.unraisablehook = _handle_dropped
+    sys.excepthook = _print_unless_interrupt  # Cython prints what it drops, too
+
+
+def _handle_dropped(dropped: sys.UnraisableHookArgs) -> None:
+    if issubclass(dropped.exc_type, KeyboardInterrupt):
+        start_new_thread(_interrupt_later, ())
+    else:
+        sys.__unraisablehook__(dropped)
+
+
+def _print_unless_interrupt(
+    kind: type[BaseException], error: BaseException, where: TracebackType | None
+) -> None:
+    if not issubclass(kind, KeyboardInterrupt):
+        sys.__excepthook__(kind, error, where)
+
+
 def _handle_interrupt(number: int, frame: FrameType | None) -> None:
     """Handle Ctrl-C: exit at once during the imports of a command, before any work is done.
 
-    Otherwise raises KeyboardInterrupt. A module imported in the middle of a run may swallow it, and
-    Python prints and drops it where an object goes, so there the interrupt is raised again later.
+    Otherwise raises KeyboardInterrupt. A module imported in the middle of a run may swallow it, so
+    there the interrupt is raised again later.
     """
     extension = sys.modules.get(EXTENSION_MODULE)
     if extension is not None and hasattr(extension, "ignore_leaks"):  # completely imported
@@ -75,10 +98,7 @@ def _handle_interrupt(number: int, frame: FrameType | None) -> None:
         interruption = sys.modules.get(INTERRUPTION_MODULE)
         if interruption is not None:
             interruption.record_interrupt()
-        if not _drops_exceptions(frame):
-            raise KeyboardInterrupt
-        start_new_thread(_interrupt_later, ())
-        return
+        raise KeyboardInterrupt
     if not any(map(_is_library_frame, _callers(importer))):
         os._exit(_flush_output(EXIT_INTERRUPTED))  # no work to finish
     # Not a Timer, which takes locks that the interrupted code may hold.
@@ -88,14 +108,6 @@ def _handle_interrupt(number: int, frame: FrameType | None) -> None:
 def _interrupt_later() -> None:
     time.sleep(RETRY_DELAY)
     interrupt_main()
-
-
-def _drops_exceptions(frame: FrameType | None) -> bool:
-    """Whether Python calls this code when an object goes."""
-    if frame is None:
-        return False
-    module = frame.f_globals.get("__name__")
-    return frame.f_code.co_name == "__del__" or module in WEAK_REFERENCES
 
 
 def _importing_frame(frame: FrameType | None) -> FrameType | None:

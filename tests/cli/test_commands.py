@@ -11,7 +11,7 @@ import subprocess
 import sys
 import time
 import urllib.request
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -409,7 +409,7 @@ AS_A_WEAK_REFERENCE_GOES = """
 import signal, sys, time, weakref
 from hovi import __main__ as entry
 
-signal.signal(signal.SIGINT, entry._handle_interrupt)
+entry.handle_interrupts()
 there = {"__name__": "weakref", "signal": signal}
 exec("def remove(_): signal.raise_signal(signal.SIGINT)", there)
 
@@ -429,6 +429,65 @@ def test_an_interrupt_where_python_drops_exceptions_comes_after_it() -> None:
     command = [sys.executable, "-c", AS_A_WEAK_REFERENCE_GOES]
     done = subprocess.run(command, capture_output=True, timeout=60, check=False)
     assert (done.returncode, done.stderr.decode()) == (7, "")
+
+
+AS_SOBOL_TABLES_LOAD = """
+import os, signal, sys
+import numpy as np
+from hovi.__main__ import run
+
+load = np.load
+
+def interrupted(file, *rest, **options):
+    if "sobol" in str(getattr(file, "name", file)):
+        np.load = load
+        os.kill(os.getpid(), signal.SIGINT)
+    return load(file, *rest, **options)
+
+np.load = interrupted
+run()
+"""
+
+SOBOL_STUDY = """
+scene = "two_link_reach"
+[[vary]]
+field = "goal.q"
+sample = {lower = [0.0, 0.0], upper = [1.0, 1.0], count = 64}
+"""
+
+
+def test_an_interrupt_that_compiled_code_drops_ends_a_study(tmp_path: Path) -> None:
+    """SciPy's compiled loader of tables cannot raise: the study planned all of its cells."""
+    (tmp_path / "study.toml").write_text(SOBOL_STUDY)
+    command = [sys.executable, "-c", AS_SOBOL_TABLES_LOAD, "study", "study.toml", "--out", "out"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120, cwd=tmp_path)
+    assert done.returncode == 130
+    assert "Traceback" not in done.stderr
+    assert "64 of 64" not in done.stdout
+
+
+@pytest.mark.parametrize("name", ["", ".", "/"])
+@pytest.mark.parametrize("command", [("export", "--csv"), ("plot",), ("report",)])
+def test_a_motion_without_a_name_is_refused(command: tuple[str, ...], name: str, run: Run) -> None:
+    code, out, err = run(*command, name)
+    assert (code, out) == (2, "")
+    assert re.fullmatch(r"error: FILE must be a motion, such as motion\.npz, and not '/?'\.\n", err)
+
+
+@pytest.fixture
+def deep(tmp_path: Path) -> Iterator[Path]:
+    """A folder that does not exist yet, and whose removal is more than `shutil.rmtree` can do."""
+    yield tmp_path.joinpath(*["d"] * 1_500)
+    subprocess.run(["rm", "-rf", tmp_path / "d"], check=True)
+
+
+def test_a_study_goes_into_a_folder_that_is_a_thousand_deep(
+    run: Run, deep: Path, tmp_path: Path
+) -> None:
+    (tmp_path / "study.toml").write_text('scene = "two_link_reach"\n')
+    code, _, err = run("study", tmp_path / "study.toml", "--out", deep, "--workers", "1")
+    assert (code, err) == (0, "")
+    assert (deep / "plans.parquet").exists()
 
 
 # Describing robots and scenes, and showing motions

@@ -75,7 +75,7 @@ def _links(pid: int) -> list[str]:
     with suppress(OSError):
         for each in (PROC / str(pid) / "fd").iterdir():
             with suppress(OSError):
-                found.append(os.readlink(each))
+                found.append(str(each.readlink()))
     return found
 
 

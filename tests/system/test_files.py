@@ -1,4 +1,4 @@
-"""Only regular files of acceptable size are read."""
+"""Only regular files of acceptable size are read; outputs go where a path leads, and stay there."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from hovi.errors import HoviError
 from hovi.planning.task_file.reading import load_task
 from hovi.robot.loading import load_robot
 from hovi.robot.srdf import read_srdf_file
-from hovi.system.files import require_file
+from hovi.system.files import make_folders, require_file, whole_file
 
 READERS: tuple[Callable[[Path], object], ...] = (
     load_robot,
@@ -60,3 +60,73 @@ def test_a_huge_file_is_refused_without_reading_it(
         stream.truncate(2**34)  # sparse
     with pytest.raises(HoviError, match=r"it has 17179\.9 MB, and at most"):
         read(path)
+
+
+def written(path: Path) -> None:
+    with whole_file(path) as stream:
+        stream.write(b"new")
+
+
+@pytest.mark.parametrize("exists", [True, False])
+@pytest.mark.parametrize("relative", [True, False])
+def test_an_output_that_is_a_link_goes_to_the_file_to_which_it_leads(
+    exists: bool, relative: bool, tmp_path: Path
+) -> None:
+    (tmp_path / "elsewhere").mkdir()
+    file, link = tmp_path / "elsewhere" / "file", tmp_path / "link"
+    link.symlink_to("elsewhere/file" if relative else file)
+    if exists:
+        file.write_bytes(b"old")
+    written(link)
+    assert link.is_symlink()
+    assert file.read_bytes() == b"new"
+    assert [each.name for each in tmp_path.iterdir()].count(".link") == 0
+    assert len(list(file.parent.iterdir())) == 1
+
+
+def test_a_link_that_leads_to_itself_or_to_no_folder_is_refused(tmp_path: Path) -> None:
+    for target in ("link", "missing/file"):
+        link = tmp_path / "link"
+        link.unlink(missing_ok=True)
+        link.symlink_to(target)
+        with pytest.raises(OSError, match=r"leads to itself|No such file"):
+            written(link)
+        assert str(link.readlink()) == target
+        assert len(list(tmp_path.iterdir())) == 1
+
+
+def test_a_replaced_file_keeps_its_permissions(tmp_path: Path) -> None:
+    path = tmp_path / "private"
+    path.write_bytes(b"old")
+    path.chmod(0o600)
+    written(path)
+    assert path.read_bytes() == b"new"
+    assert path.stat().st_mode & 0o777 == 0o600
+
+
+def test_a_file_and_its_name_are_on_the_disk_when_it_is_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    synced: list[tuple[str, bool]] = []
+
+    def fsync(descriptor: int) -> None:
+        at = Path(f"/proc/self/fd/{descriptor}").stat()
+        known = {path.stat().st_ino: path.name for path in (tmp_path, *tmp_path.iterdir())}
+        synced.append((known.get(at.st_ino, "unnamed"), (tmp_path / "file").exists()))
+
+    monkeypatch.setattr(os, "fsync", fsync)
+    written(tmp_path / "file")
+    assert synced == [("unnamed", False), (tmp_path.name, True)]
+
+
+def test_new_folders_are_synced_to_those_above(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    synced: list[str] = []
+    monkeypatch.setattr(
+        os, "fsync", lambda number: synced.append(str(Path(f"/proc/self/fd/{number}").readlink()))
+    )
+    make_folders(tmp_path / "a" / "b")
+    assert synced == [str(tmp_path), str(tmp_path / "a")]
+    make_folders(tmp_path / "a" / "b")
+    assert len(synced) == 2

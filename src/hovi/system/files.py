@@ -24,28 +24,68 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
     The bytes go to an unnamed file in the same folder until all of them are on the disk, so a
     process that is killed leaves nothing behind. Where the file system has no unnamed files, they
     go to a hidden temporary file, which is removed if anything fails, Ctrl-C included. An existing
-    file at `path` is unchanged until then.
+    file at `path` is unchanged until then. When the block has ended, the file and its name are on
+    the disk.
 
-    path: the file to write; an existing regular file is replaced.
+    path: the file to write; an existing regular file is replaced and keeps its permissions. Of a
+        symbolic link, the file to which it leads is written, and the link stays.
     Raises OSError as the operating system does, and when `path` is a folder or a device, or no
     path at all.
     """
-    target = Path(path)
-    _require_name(target)
-    if target.exists() and not target.is_file():
-        # As root, a rename onto /dev/null would replace the device itself.
-        raise OSError("it exists and is not a regular file")
+    target = _written(Path(path))
     temporary = target.with_name(f".{target.name[:50]}.{os.urandom(6).hex()}.tmp")  # 255 bytes
     try:
         with _open(temporary) as stream:
             yield stream
             stream.flush()
+            if target.exists():
+                os.fchmod(stream.fileno(), stat.S_IMODE(target.stat().st_mode))
             os.fsync(stream.fileno())
             if not temporary.exists():
                 _link(stream, temporary)
         temporary.replace(target)  # a hard link cannot replace an existing file
+        sync_folder(target.parent)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def make_folders(folder: Path) -> None:
+    """Create a folder and those above it that do not exist. Raises OSError.
+
+    `Path.mkdir` calls itself for each missing folder, and so fails for a thousand of them.
+    """
+    missing = [each for each in (folder, *folder.parents) if not each.is_dir()]
+    for each in reversed(missing):
+        each.mkdir(exist_ok=True)
+        sync_folder(each.parent)
+
+
+def sync_folder(folder: Path) -> None:
+    """Wait until the names of a folder's files are on the disk, where the system can do that."""
+    with contextlib.suppress(OSError):  # of file systems whose folders cannot be synced
+        descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
+
+
+def _written(path: Path) -> Path:
+    """The file that is written at a path, which is another one where the path is a link.
+
+    Raises OSError unless it is a regular file or none yet. In a folder of everybody's, such as
+    /tmp, Linux does not follow another user's link: `exists` raises PermissionError.
+    """
+    _require_name(path)
+    if path.exists() and not path.is_file():
+        # As root, a rename onto /dev/null would replace the device itself.
+        raise OSError("it exists and is not a regular file")
+    if not path.is_symlink():
+        return path
+    file = Path(os.path.realpath(path))
+    if file.is_symlink():
+        raise OSError("it is a symbolic link that leads to itself")
+    return file
 
 
 def _require_name(path: Path) -> None:

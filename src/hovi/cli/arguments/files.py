@@ -42,6 +42,14 @@ def check_output(path: Path, *suffixes: str) -> Path:
     return path
 
 
+def beside(file: Path, suffix: str) -> Path:
+    """The path of a motion's file with another extension. Raises InputError if it has no name."""
+    if not file.name:
+        given = str(file) if file.parts else ""
+        raise InputError(f"FILE must be a motion, such as motion.npz, and not {given!r}.")
+    return file.with_suffix(suffix)
+
+
 def load_trajectory(path: Path) -> Trajectory:
     """A motion written by `hovi plan --out`."""
     from hovi.discrete.trajectory import Trajectory

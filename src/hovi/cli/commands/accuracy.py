@@ -100,12 +100,12 @@ def _write(diagram: Diagram, folder: Path) -> list[Path]:
     from hovi.accuracy.picture import plot_work_precision
     from hovi.accuracy.tables import as_csv, as_json
     from hovi.errors import InputError
-    from hovi.system.files import reason, whole_file
+    from hovi.system.files import make_folders, reason, whole_file
 
     stem = folder / f"{diagram.scene}_accuracy"
     texts = {stem.with_suffix(".csv"): as_csv(diagram), stem.with_suffix(".json"): as_json(diagram)}
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        make_folders(folder)
         for path, text in texts.items():
             with whole_file(path) as stream:
                 stream.write(text.encode())

@@ -19,10 +19,10 @@ def plot(
     ] = None,
 ) -> None:
     """Plot q, v and tau of a motion; for a planar two-link arm, its swept surface as well."""
-    from hovi.cli.arguments.files import check_output, load_trajectory
+    from hovi.cli.arguments.files import beside, check_output, load_trajectory
     from hovi.viewing.plotting import plot_all
 
-    target = out or file.with_suffix(".png")
+    target = out or beside(file, ".png")
     if target.is_dir():
         target = target / f"{file.stem}.png"
     check_output(target, ".png", ".pdf", ".svg")

@@ -25,7 +25,7 @@ from hovi.robot.example_robots import example_robot
 from hovi.robot.source import RobotSource
 from hovi.robot.srdf import read_srdf_file
 from hovi.schemes import by_name
-from hovi.system.files import reason, whole_file
+from hovi.system.files import make_folders, reason, whole_file
 
 _TABLES = ("limits", "start", "goal", "segments", "via", "obstacles", "grasped", "scheme")
 """Keys that may hold tables, in the order in which the tables are written."""
@@ -44,7 +44,7 @@ def save_task(task: Task, path: str | Path) -> Path:
     path = Path(path)
     content = tomlkit.dumps(_document(task, path.parent)).encode("utf-8")
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
+        make_folders(path.parent)
         _keep_robot_beside(task.scene.robot.source, path)
         _write(path, content)
     except OSError as refused:

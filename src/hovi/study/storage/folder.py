@@ -13,7 +13,7 @@ from typing import Self
 from hovi.errors import StudyError
 from hovi.study.storage.journal import FOLDER
 from hovi.system.dataclass import dataclass
-from hovi.system.files import names_file, reason, require_file, whole_file
+from hovi.system.files import make_folders, names_file, reason, require_file, whole_file
 
 ABOUT = "study.json"
 """The file that says which study a folder holds."""
@@ -71,7 +71,7 @@ class About:
 def used_alone(folder: Path) -> Iterator[None]:
     """The folder, created if need be, which no other run uses. Raises StudyError."""
     try:
-        (folder / FOLDER).mkdir(parents=True, exist_ok=True)
+        make_folders(folder / FOLDER)
         descriptor = os.open(folder / ".lock", os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
     except OSError as refused:
         raise StudyError(f"{folder} cannot be written: {reason(refused)}.") from None
