@@ -13,8 +13,11 @@ from typing import Any
 import pytest
 
 from hovi.system.deadline import Deadline
+from hovi.workers import frames, pool
 from hovi.workers.lost import Lost
-from hovi.workers.pool import end_idle_workers, results_in_workers
+from hovi.workers.pool import end_idle_workers, results_from, results_in_workers
+from hovi.workers.source import Source, Taken
+from hovi.workers.stopped import STOPPED, state_of
 from oracles.processes import children, is_running, wait_until
 
 Work = Callable[[int, float | None], Any]
@@ -154,6 +157,82 @@ def test_work_that_does_not_end_in_time_is_given_up_and_its_process_ended(tmp_pa
     pids = [int(path.name) for path in tmp_path.iterdir()]
     assert pids
     wait_until(lambda: not any(map(is_running, pids)))
+
+
+@pytest.fixture
+def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A pool that looks more often than once a second."""
+    monkeypatch.setattr(pool, "LOOK_SECONDS", 0.02)
+    monkeypatch.setattr(frames, "PATIENCE", 0.2)
+
+
+@pytest.mark.usefixtures("impatient")
+def test_a_stopped_worker_is_given_up_and_a_slow_one_is_not() -> None:
+    def work(i: int, left: float | None) -> int:
+        if i == 1:
+            os.kill(os.getpid(), signal.SIGSTOP)
+        time.sleep(1.0 if i == 0 else 0.0)
+        return i
+
+    found = run(work, 4)
+    assert found == {0: 0, 1: Lost(STOPPED), 2: 2, 3: 3}
+
+
+@pytest.mark.usefixtures("impatient")
+def test_a_worker_that_is_continued_in_time_loses_nothing() -> None:
+    def work(i: int, left: float | None) -> int:
+        if i == 0:
+            waker = f"sleep 0.1; kill -CONT {os.getpid()}"
+            subprocess.Popen(["sh", "-c", waker], start_new_session=True)
+            os.kill(os.getpid(), signal.SIGSTOP)
+        return i
+
+    assert run(work, 2) == {0: 0, 1: 1}
+
+
+@pytest.mark.usefixtures("impatient")
+@pytest.mark.parametrize("size", [1, 1_000_000])
+def test_a_worker_that_was_stopped_between_calls_is_not_used_again(size: int) -> None:
+    stopped = run(lambda i, left: os.getpid(), 1)[0]
+    os.kill(stopped, signal.SIGSTOP)
+    wait_until(lambda: state_of(stopped) == "T")
+    items = [b"x" * size] * 3
+    found = dict(results_in_workers(lambda x, left: (len(x), os.getpid()), items, 2, Deadline()))
+    assert [found[i][0] for i in range(3)] == [size] * 3
+    assert stopped not in {pid for _, pid in found.values()}
+    assert not is_running(stopped)
+
+
+@pytest.mark.usefixtures("impatient")
+def test_what_a_stopped_worker_does_not_read_blocks_nothing() -> None:
+    def stop_soon(x: bytes, left: float | None) -> int:
+        waker = f"sleep 0.1; kill -STOP {os.getpid()}"
+        subprocess.Popen(["sh", "-c", waker], start_new_session=True)
+        return len(x)
+
+    def items() -> Iterator[bytes]:
+        yield b""
+        time.sleep(0.3)  # as the worker is stopped between two items
+        yield b"x" * 1_000_000
+
+    source = Drawn(items())
+    found = dict(results_from(source, stop_soon, 1, Deadline()))
+    assert found == {0: 0, 1: Lost(STOPPED)}
+
+
+class Drawn(Source[bytes]):
+    """The items of an iterator, each made when it is asked for."""
+
+    def __init__(self, items: Iterator[bytes]) -> None:
+        self._items = items
+
+    def take(self) -> Taken[bytes] | None:
+        item = next(self._items, None)
+        return None if item is None else Taken(item)
+
+    @property
+    def may_give_more(self) -> bool:
+        return False
 
 
 @pytest.mark.parametrize("program", ["/nowhere/python", "/bin/false", "/bin/true"])

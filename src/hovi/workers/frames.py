@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import os
 import pickle
+import select
 from typing import Any
 
 _HEADER = 8
 _MAX_READ = 1 << 20
+PATIENCE = 10.0
+"""Time in [s] to wait at a full pipe for a process that reads nothing, as where it is stopped."""
 
 
 class ClosedPipeError(Exception):
-    """The process at the other end is gone."""
+    """The process at the other end is gone, or reads nothing."""
 
 
 def send(descriptor: int, *parts: object) -> None:
@@ -20,9 +23,21 @@ def send(descriptor: int, *parts: object) -> None:
     rest = memoryview(len(payload).to_bytes(_HEADER, "big") + payload)
     try:
         while rest:
-            rest = rest[os.write(descriptor, rest) :]
+            rest = rest[_written(descriptor, rest) :]
     except BrokenPipeError:
         raise ClosedPipeError from None
+
+
+def _written(descriptor: int, rest: memoryview) -> int:
+    """Write some bytes, and how many. Raises ClosedPipeError where there is no room for long."""
+    try:
+        return os.write(descriptor, rest)
+    except BlockingIOError:
+        room = select.poll()
+        room.register(descriptor, select.POLLOUT)
+        if not room.poll(1e3 * PATIENCE):
+            raise ClosedPipeError from None
+        return 0
 
 
 class Receiver:

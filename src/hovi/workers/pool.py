@@ -26,6 +26,7 @@ from hovi.workers.frames import ClosedPipeError, Receiver, send
 from hovi.workers.lost import Lost
 from hovi.workers.serving import IDLE_SECONDS
 from hovi.workers.source import Listed, Source
+from hovi.workers.stopped import LOOK_SECONDS, STOPPED, Watch
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -97,7 +98,9 @@ class _Worker:
         assert self.process.stdin is not None
         assert self.process.stdout is not None
         self.requests, self.answers = self.process.stdin.fileno(), self.process.stdout.fileno()
+        os.set_blocking(self.requests, False)
         self.receiver = Receiver(self.answers)
+        self.watch = Watch(self.process.pid)
         self.work = b""
         self.item: int | None = None
         self.is_ready = False
@@ -107,7 +110,8 @@ class _Worker:
     def is_usable(self) -> bool:
         """Whether a parked worker is alive and has this process's environment."""
         fresh = time.monotonic() - self.parked < MAX_PARKED_SECONDS
-        return fresh and self.environment == dict(os.environ) and self.process.poll() is None
+        alive = self.process.poll() is None and not self.watch.is_stopped
+        return fresh and self.environment == dict(os.environ) and alive
 
     def begin(self, work: bytes, number: int, item: bytes, left: float | None) -> None:
         """Send an item, and the work if it is not the last one. Raises ClosedPipeError."""
@@ -146,7 +150,7 @@ class _Crew(Generic[Item, Result]):
         deadline: Deadline,
     ) -> None:
         self.work, self.source, self.deadline = cloudpickle.dumps(work), source, deadline
-        self.taken = 0
+        self.taken, self.looked = 0, time.monotonic()
         self.selector = selectors.DefaultSelector()
         self.hands: list[_Worker] = []
         for _ in range(count):
@@ -160,11 +164,13 @@ class _Crew(Generic[Item, Result]):
                 return
             if self.deadline.passed and not self._is_busy:
                 return
-            ready = self.selector.select(self._patience)
-            if not ready and self.deadline.passed:
+            ready = self.selector.select(LOOK_SECONDS)
+            if not ready and not self.deadline.allows(-GRACE):
                 return
             for key, _ in ready:
                 yield from self._heard(key.data)
+            if time.monotonic() > self.looked + LOOK_SECONDS:
+                yield from self._look()
 
     def dismiss(self) -> None:
         """Keep idle workers for the next call, and end the others."""
@@ -180,11 +186,6 @@ class _Crew(Generic[Item, Result]):
     @property
     def _is_busy(self) -> bool:
         return any(worker.item is not None for worker in self.hands)
-
-    @property
-    def _patience(self) -> float | None:
-        left = self.deadline.seconds_left
-        return None if left is None else left + GRACE
 
     def _hire(self) -> None:
         """One more worker, unless the system refuses one."""
@@ -224,8 +225,15 @@ class _Crew(Generic[Item, Result]):
             worker.is_ready = True
             yield from _result(number, *message)
 
+    def _look(self) -> Iterator[tuple[int, Lost]]:
+        """Give up workers that have been stopped for long: they would be waited for without end."""
+        self.looked = time.monotonic()
+        for worker in list(self.hands):
+            if worker.watch.looks_stopped():
+                yield from self._bury(worker)
+
     def _bury(self, worker: _Worker) -> Iterator[tuple[int, Lost]]:
-        """Replace a dead worker if there may be more to do; its item is lost.
+        """Replace a dead or stopped worker if there may be more to do; its item is lost.
 
         One that died before any item is not replaced.
 
@@ -233,12 +241,12 @@ class _Crew(Generic[Item, Result]):
         """
         self.selector.unregister(worker.answers)
         self.hands.remove(worker)
-        code = worker.end()
+        stopped, code = worker.watch.is_stopped, worker.end()
         if worker.item is None:
             return
         if not self.deadline.passed and self.source.may_give_more:
             self._hire()
-        yield worker.item, Lost(_cause(code))
+        yield worker.item, Lost(STOPPED if stopped else _cause(code))
 
 
 def _result(number: int | None, kind: str, content: bytes = b"") -> Iterator[tuple[int, Any]]:
