@@ -46,6 +46,7 @@ from hovi.planning.refinement.whirling import (
 )
 from hovi.planning.solver.methods.method import Method, Report
 from hovi.planning.solver.methods.stationary import Stationary
+from hovi.planning.solver.outcome.judge import judged, without_success
 from hovi.planning.solver.receding.shift import Shift
 from hovi.planning.solver.solver import Check, MotionCheck, Solution, solve_on_grid
 from hovi.planning.solver.status import Status
@@ -139,13 +140,17 @@ def resolved(solution: Solution) -> Solution:
         fast, the finer solution has a minimum nearby on a still finer grid: see
         `fault_of_whirling`;
     (e) without limits, the finer solution is near, or a still finer one is much closer to it: see
-        `fault_of_distance`.
+        `fault_of_distance`;
+    (f) it is usable: see `judged`.
     Solutions of another status are returned unchanged. If the deadline in force passes before
     all of this is known, the status is TIME_LIMIT.
     """
     if not solution.success or solution.problem is None:
         return solution
     try:
+        solution = judged(solution)
+        if not solution.success:
+            return solution
         solution, reason, finer = _checked(solution)
     except OutOfTimeError:
         return _not_checked(solution)
@@ -231,7 +236,11 @@ class Resolution(MotionCheck):
         return FARTHER if calm else NEARBY
 
     def __call__(self, solution: Solution) -> Solution:
-        """The solution as `resolved` returns it; near the resolved motion with (a) at most."""
+        """The solution as `resolved` returns it; near the resolved one with (a) and (f) at most."""
+        try:
+            solution = judged(solution)
+        except OutOfTimeError:
+            return _not_checked(solution)
         estimate = self._kept_for(solution) if solution.success else None
         if estimate is None:
             return self._followed(solution) or resolved(solution)
@@ -360,7 +369,7 @@ def _unresolved(solution: Solution, reason: str) -> Solution:
         f"the motion is {what} on {solution.problem.grid.intervals} intervals, which do not "
         f"resolve it: {reason}; {_remedy(solution)}."
     )
-    return _failed(solution, Status.UNRESOLVED, message)
+    return without_success(solution, Status.UNRESOLVED, message)
 
 
 def _not_checked(solution: Solution) -> Solution:
@@ -371,19 +380,7 @@ def _not_checked(solution: Solution) -> Solution:
         f"{solution.cost:.10g}, but the time limit was reached before it was compared with one on "
         "a finer grid; allow more time."
     )
-    return _failed(solution, Status.TIME_LIMIT, message)
-
-
-def _failed(solution: Solution, status: Status, message: str) -> Solution:
-    return dataclasses.replace(
-        solution,
-        success=False,
-        status=status,
-        message=message,
-        trajectory=with_metadata(solution.trajectory, status=str(status)),
-        minima=(),
-        check=None,
-    )
+    return without_success(solution, Status.TIME_LIMIT, message)
 
 
 def _remedy(solution: Solution) -> str:

@@ -32,9 +32,8 @@ from hovi.planning.solver.methods.choice import method_for, method_from
 from hovi.planning.solver.methods.method import Method, MethodResult, Report
 from hovi.planning.solver.methods.result_motion import motion_of
 from hovi.planning.solver.methods.stationary import Stationary
-from hovi.planning.solver.outcome.margins import Margins, margins_of
+from hovi.planning.solver.outcome.judge import judged
 from hovi.planning.solver.outcome.solution_summary import SolutionSummary
-from hovi.planning.solver.outcome.violation import violation_of
 from hovi.planning.solver.receding.ends import (
     as_goal,
     as_start,
@@ -68,7 +67,7 @@ class Solution(SolutionSummary):
     """The solution of a trajectory problem, or the best motion found.
 
     success: whether a minimum, or the stationary point that was sought, was found; after `plan`,
-        `solve` and `replan`, a resolved one.
+        `solve` and `replan`, a resolved one that is `usable`.
     status, message: the outcome, as a word and in a sentence; `usable` says whether ends and limits
         hold, and `violation` what does not.
     trajectory: the motion; the best one found if there is no minimum.
@@ -115,35 +114,13 @@ class Solution(SolutionSummary):
         """
         return effort_of(self.trajectory)
 
-    def margins(self) -> Margins:
-        """How far the motion stays from each of its limits, and from obstacles.
-
-        Raises InputError if this solution has no problem.
-        """
-        return margins_of(self._solved_problem, self.trajectory)
-
-    @cached_property
-    def violation(self) -> str:
-        """What the motion violates of its ends, limits, distances and equations, "" if nothing.
-
-        A clause about the first that does not hold to 1e-6. InputError without a problem.
-        """
-        return violation_of(self._solved_problem, self.trajectory)
-
-    @property
-    def usable(self) -> bool:
-        """Whether ends, limits, distances and equations hold, be the motion a minimum or not."""
-        return not self.violation
-
     @cached_property
     def duration_derivative(self) -> float:
         """d cost / d T with all else fixed, per [s]: minus Pontryagin's Hamiltonian.
 
         For an effort that does not depend on time. Raises InputError without a problem.
         """
-        if self.problem is None:
-            raise InputError("this solution has no problem; call plan again instead.")
-        ld = at_instants(self.problem, self.instants).ld
+        ld = at_instants(self._solved_problem, self.instants).ld
         return ld.duration_derivative(self.trajectory.path, self.forces)
 
     @check_arguments
@@ -239,13 +216,6 @@ class Solution(SolutionSummary):
         last = f"this is the last motion from {shift.elapsed:g} s on"
         return _Again(problem, path, central, check).within(deadline, last, **options)
 
-    @property
-    def _solved_problem(self) -> TrajectoryProblem:
-        """The problem. Raises InputError if there is none."""
-        if self.problem is None:
-            raise InputError("this solution has no problem; call plan again instead.")
-        return self.problem
-
 
 Check = Callable[[Solution], Solution]
 """Returns a motion with its error estimate, or as UNRESOLVED."""
@@ -283,7 +253,7 @@ class _Again:
                 raise_if_late()
                 found = self._solved(deadline.part(SOLVE_SHARE).seconds_left, options)
                 if found.status is not Status.TIME_LIMIT:
-                    return found if self.check is None else self.check(found)
+                    return judged(found) if self.check is None else self.check(found)
                 if np.isfinite(found.cost) and self._meets(found):
                     return self._kept(found)
             except OutOfTimeError:

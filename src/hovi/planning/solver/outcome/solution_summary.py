@@ -1,10 +1,15 @@
-"""What a terminal or a notebook shows of a solution."""
+"""What a solution says of itself: how far it keeps what was asked, and its lines in a terminal."""
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 from hovi.discrete.trajectory import Trajectory
+from hovi.errors import InputError
+from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.solver.outcome.margins import Margins, margins_of
+from hovi.planning.solver.outcome.violation import violation_of
 from hovi.planning.solver.status import Status
 from hovi.system.summary import Summarized, Summary
 
@@ -15,6 +20,7 @@ if TYPE_CHECKING:
 class SolutionSummary(Summarized):
     """A solution: its outcome, motion, cost, error and time."""
 
+    success: bool
     status: Status
     message: str
     trajectory: Trajectory
@@ -26,6 +32,34 @@ class SolutionSummary(Summarized):
     minima: tuple[float, ...]
     setup_seconds: float
     solve_seconds: float
+    problem: TrajectoryProblem | None
+
+    def margins(self) -> Margins:
+        """How far the motion stays from each of its limits, and from obstacles.
+
+        Raises InputError if this solution has no problem.
+        """
+        return margins_of(self._solved_problem, self.trajectory)
+
+    @cached_property
+    def violation(self) -> str:
+        """What the motion violates of its ends, limits, distances and equations, "" if nothing.
+
+        A clause about the first that does not hold to 1e-6. InputError without a problem.
+        """
+        return violation_of(self._solved_problem, self.trajectory)
+
+    @property
+    def usable(self) -> bool:
+        """Whether ends, limits, distances and equations hold, be the motion a minimum or not."""
+        return not self.violation
+
+    @property
+    def _solved_problem(self) -> TrajectoryProblem:
+        """The problem. Raises InputError if there is none."""
+        if self.problem is None:
+            raise InputError("this solution has no problem; call plan again instead.")
+        return self.problem
 
     def _summary(self) -> Summary:
         motion = self.trajectory

@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from hovi.discrete.trajectory import Trajectory
-from hovi.planning.clearance.clearance_violation import approach_along, approach_sentence
-from hovi.planning.problem.limit_violation import excess_along, worst_sentence
+from hovi.planning.clearance.clearance_violation import (
+    approach_along,
+    approach_sentence,
+    near_pairs,
+)
+from hovi.planning.problem.limit_violation import excess_of, worst_sentence
 from hovi.planning.problem.limits import Limits
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.action_objective import ActionObjective
@@ -13,6 +19,8 @@ from hovi.planning.solver.augmented_lagrangian_rounds import (
     missed_clause,
     within,
 )
+from hovi.planning.solver.limits.limited_coordinates import LimitedCoordinates
+from hovi.planning.solver.outcome.control_polygons import exceeds
 from hovi.planning.solver.receding.last_motion import MET, misses
 
 
@@ -39,15 +47,20 @@ def violation_of(problem: TrajectoryProblem, motion: Trajectory) -> str:
     if problem.distances is None or problem.clearance is None:
         return ""
     margin = float(problem.clearance.margin)
-    approach = approach_along(motion, problem.distances, margin)
-    if approach.distance.min() >= margin - MET:
+    pairs = near_pairs(motion, problem.distances, margin - MET)
+    if len(pairs) == 0:
         return ""
-    return approach_sentence(motion, problem.distances, approach, margin)
+    near = problem.distances.restricted(pairs.tolist())
+    return approach_sentence(motion, near, approach_along(motion, near, margin), margin)
 
 
 def _exceeded(motion: Trajectory, limits: Limits) -> bool:
+    """Whether a limit is exceeded anywhere: polynomials are compared exactly, torques sampled."""
     if not limits.bounded.any():
         return False
     most = max(MET, limits.tolerance)
-    at_samples = excess_along(motion, limits, refined=False).worst
-    return at_samples > most or excess_along(motion, limits).worst > most
+    limited = LimitedCoordinates.of(limits, motion.grid, motion.space)
+    if exceeds(motion, limited, most):
+        return True
+    sampled = excess_of(motion, limits, limited.others(limits))
+    return not bool(np.max(sampled) <= most)
