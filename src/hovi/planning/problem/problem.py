@@ -62,7 +62,7 @@ class TrajectoryProblem(ProblemSummary):
     ld: the discrete Lagrangian on a grid: of the effort of a scene, or any other.
     start: state at t = 0. goal: state at t = T, a task-space goal, or Periodic.
     limits: bounds along the motion; none if None. via: via points, at nodes of the grid.
-    clearance: obstacles and their margin; none if None.
+    clearance: obstacles and their margin; none if None. time_weight: w of J + w T.
     boundary: (q0, v0, q1, v1) of the two ends; initial guesses in free components.
     end_jets: (q, q', ..., q^(k-1)) of the two ends for orders k other than 2, k arrays of two rows.
     free_ends: which of (q, q', ..., q^(k-1)) are free at the start and at the goal, shape
@@ -79,6 +79,7 @@ class TrajectoryProblem(ProblemSummary):
     limits: Limits | None = None
     via: tuple[Via, ...] = ()
     clearance: Clearance | None = None
+    time_weight: float = 0.0
     boundary: Boundary = field(init=False, repr=False)
     end_jets: tuple[Array, ...] = field(init=False, repr=False)
     free_ends: Mask = field(init=False, repr=False)
@@ -216,8 +217,7 @@ class TrajectoryProblem(ProblemSummary):
         if self.ld.k == 2:
             path = path_on_grid(curve, self.grid, self.ends(*ends), self.coordinates)
         else:
-            fixed = self._with_fixed(ends)
-            path = path_of_any_order(curve, self.grid, fixed, self.coordinates)
+            path = path_of_any_order(curve, self.grid, self._with_fixed(ends), self.coordinates)
         return holding(path, self.grid, self.holds)
 
     def moved(self, path: DiscretePath) -> DiscretePath:

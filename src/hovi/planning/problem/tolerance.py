@@ -129,11 +129,14 @@ class Tolerance:
             return max(error.angle, error.slide)
         return error.largest_tip
 
-    def in_words(self, size: float, at: str = "") -> str:
-        """An error of this quantity, with its unit. at: its frame; "" names all frames measured."""
+    def in_words(self, size: float, at: str = "", cost: str = "the cost") -> str:
+        """An error of this quantity, with its unit.
+
+        at: its frame; "" names all frames measured. cost: what relative errors are relative to.
+        """
         if self.quantity is Quantity.COST:
             number = f"{size / SHARES[self.unit]:.2g}"
-            return f"{number} {self.unit} of the cost".replace("  ", " ")
+            return f"{number} {self.unit} of {cost}".replace("  ", " ")
         if self.quantity is Quantity.JOINTS:
             unit = self.unit or "rad"
             return f"{size / ANGLES[unit]:.2g} {unit} in the joints"
@@ -186,6 +189,7 @@ class Accuracy:
     reached: whether error <= tolerance. reason: why the refinement ended early; "" if it did not.
     rounds: the grids that were solved on. compare: computes `estimate`.
     along: relative error of the integral of L~ along the curve; NaN if unknown.
+    timed: whether the cost, to which errors are relative, is J + w T, with the price of time.
     """
 
     tolerance: Tolerance
@@ -195,6 +199,7 @@ class Accuracy:
     rounds: tuple[Round, ...] = ()
     compare: Callable[[], MotionError] | None = field(default=None, repr=False)
     along: float = np.nan
+    timed: bool = False
 
     @cached_property
     def estimate(self) -> MotionError | None:
@@ -203,10 +208,11 @@ class Accuracy:
 
     def __str__(self) -> str:
         """One sentence."""
-        wanted = self.tolerance.in_words(self.tolerance.size)
+        cost = "the cost J + w T" if self.timed else "the cost"
+        wanted = self.tolerance.in_words(self.tolerance.size, cost=cost)
         if np.isnan(self.error):
             return f"{self.reason}; no error was estimated (tolerance {wanted})."
-        error = self.tolerance.in_words(self.error, self._frame)
+        error = self.tolerance.in_words(self.error, self._frame, cost)
         found = f"estimated error {error}, tolerance {wanted}"
         if not self.reached and self.along > CURVE_TOLERANCE:
             found = f"the integral along the curve differs by {self.along:.1e}; {found}"

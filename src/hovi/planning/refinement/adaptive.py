@@ -302,6 +302,7 @@ class _Search:
             tuple(self.rounds),
             None if finer is None else partial(estimate_against, solution, finer, self._frame),
             chosen.along,
+            solution.problem is not None and solution.problem.time_weight > 0.0,
         )
         steps = sum(done.nit for done in self.rounds) or solution.nit
         message = solution.message

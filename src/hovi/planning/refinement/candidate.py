@@ -27,6 +27,7 @@ from hovi.planning.refinement.passive_torque import (
 )
 from hovi.planning.refinement.whirling import Whirl, whirl
 from hovi.planning.solver.limits.limit_rows import MAX_LOSS
+from hovi.planning.solver.outcome.cost_with_time import price_of_time
 from hovi.planning.solver.solver import Solution
 from hovi.planning.solver.status import Status
 from hovi.schemes import is_galerkin
@@ -219,7 +220,7 @@ def _cost_of_unfinished(solution: Solution) -> float:
     if problem.limited or problem.constrained or not np.isfinite(solution.cost):
         return np.inf
     along = integral_along(problem.ld.lagrangian, solution.trajectory).value
-    return float(max(solution.cost, along))
+    return float(max(solution.cost, along + price_of_time(problem)))
 
 
 def _errors_of_cost(
@@ -281,7 +282,7 @@ def error_along(solution: Solution, finer: FinerSolution) -> float:
     if not all(is_galerkin(scheme) for scheme, _ in problem.grid.groups):
         return 0.0
     integral = integral_along(problem.ld.lagrangian, solution.trajectory)
-    return relative_difference(integral.value, finer.cost)
+    return relative_difference(integral.value + price_of_time(problem), finer.cost)
 
 
 def least_error(solution: Solution) -> float:

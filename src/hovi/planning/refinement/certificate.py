@@ -19,6 +19,7 @@ from hovi.planning.problem.limit_violation import excess_along
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.refinement.error_estimate import estimate_error
 from hovi.planning.refinement.nodal_hamiltonian import NodalHamiltonian, nodal_hamiltonian
+from hovi.planning.solver.outcome.cost_with_time import price_of_time
 from hovi.planning.solver.solver import Solution
 from hovi.planning.solver.status import Status
 from hovi.system.dataclass import dataclass
@@ -50,9 +51,9 @@ class Certificate:
     """Checks of a plan; one that is not available is None, with the reason in `missing`.
 
     status: of the solve. n_neg: negative eigenvalues of the action's Hessian.
-    action: the discrete action of L~, which is the plan's cost. integral: of L~ along the
-        interpolant, by a quadrature that the scheme does not use. integral_error: of the
-        quadrature.
+    action: the discrete action of L~, which is the plan's cost without the price of time. price:
+        that of time. integral: of L~ along the interpolant, by a quadrature that the scheme does
+        not use. integral_error: of the quadrature.
     bound: upper bound of the cost of this local minimum, the integral plus its error: for a curve
         that meets all constraints, since no such curve nearby costs less than the minimum.
     errors: estimates of the distance from the motion that the plan approximates.
@@ -76,11 +77,12 @@ class Certificate:
     velocity: Peak
     replay: DynamicsReplay | None
     missing: dict[str, str] = field(default_factory=dict)
+    price: float = 0.0
 
     @property
     def quadrature(self) -> float:
-        """Relative difference of the action and the integral."""
-        return relative_difference(self.action, self.integral)
+        """Difference of the action and the integral, relative to the cost."""
+        return relative_difference(self.action + self.price, self.integral + self.price)
 
 
 @check_arguments_except("solution")
@@ -140,6 +142,7 @@ def certify(
         velocity=velocity,
         replay=checked("replay", lambda: replay_dynamics(trajectory, frame)),
         missing=missing,
+        price=price_of_time(problem),
     )
 
 

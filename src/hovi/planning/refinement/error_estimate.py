@@ -30,6 +30,7 @@ from hovi.planning.refinement.nearby_minimum import nearby_minimum
 from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.central_path import CentralPath
 from hovi.planning.solver.methods.method import Method
+from hovi.planning.solver.outcome.cost_with_time import cost_of, price_of_time
 from hovi.planning.solver.receding.last_motion import meets
 from hovi.planning.solver.solver import Solution, solve_on_grid
 from hovi.robot.space.coordinates import Coordinates
@@ -118,7 +119,7 @@ class FinerSolution:
 
     problem: on the finer grid; limits may have split its intervals.
     path: its solution, up to a small share of its distance from the coarser one. cost: its
-        discrete action. known: the cost of the coarser solution.
+        discrete action and the price of time. known: the cost of the coarser solution.
     gains: L_d of each interval of the coarser solution minus L_d with the modes of the finer grid
         and the same end data, shape (N,): the interval's contribution to the error of the cost.
         Their sum is the difference of costs to first order.
@@ -212,7 +213,7 @@ def followed_within_limits(
     central = follow(fine, known.central.ending_at(start), RICHER_BARRIER)
     if central is None:
         return None
-    cost, coarse = fine.ld.action(central.last), problem.ld.action(path)
+    cost, coarse = cost_of(fine, central.last), cost_of(problem, path)
     gains = np.full(problem.grid.intervals, np.nan)
     return FinerSolution(fine, central.last, cost, coarse, gains, lambda: None, central)
 
@@ -258,13 +259,15 @@ def finer_solution(
     model = objective.model_with(start, efforts, None)
     gains = _gains(objective.expansion, values, 2 * fine.ld.k)
     found = nearby_minimum(objective, start, model, known)
+    price = price_of_time(problem)
     if found is not None:
-        return FinerSolution(fine, found.path, found.value, known, gains, found.solution)
+        costs = found.value + price, known + price
+        return FinerSolution(fine, found.path, *costs, gains, found.solution)
     solution = solve_on_grid(fine, start, max_iterations=MAX_FINER_STEPS, time_limit=time_limit)
     if not solution.success:
         return None
     path, cost = solution.trajectory.path, solution.cost
-    return FinerSolution(fine, path, cost, known, gains, lambda: solution)
+    return FinerSolution(fine, path, cost, known + price, gains, lambda: solution)
 
 
 def _solved(
@@ -286,7 +289,7 @@ def _solved(
     if not solution.success or solution.problem is None:
         return None
     finer = solution.trajectory
-    known, cost = problem.ld.action(path), solution.cost
+    known, cost = cost_of(problem, path), solution.cost
     gains = _cost_of_difference(problem, path, finer, abs(known - cost))
     return FinerSolution(
         solution.problem, finer.path, cost, known, gains, lambda: solution, solution.central

@@ -46,6 +46,7 @@ from hovi.planning.refinement.whirling import (
 )
 from hovi.planning.solver.methods.method import Method, Report
 from hovi.planning.solver.methods.stationary import Stationary
+from hovi.planning.solver.outcome.cost_with_time import cost_of
 from hovi.planning.solver.outcome.judge import judged, without_success
 from hovi.planning.solver.receding.shift import Shift
 from hovi.planning.solver.solver import Check, MotionCheck, Solution, solve_on_grid
@@ -274,7 +275,7 @@ class Resolution(MotionCheck):
         if len(self.path.q) != len(shift.problem.grid.t):
             return resolved
         path = shift.path(self.path)
-        cost = problem.ld.action(path)
+        cost = cost_of(problem, path)
         estimate = self.estimate * abs(self.cost) / max(abs(cost), least_cost(problem), 1e-300)
         too_large = estimate > _largest_estimate(problem)
         return resolved if too_large else Resolution(path, cost, estimate)
@@ -326,8 +327,6 @@ def _compared_with_finer(solution: Solution) -> tuple[Solution, str, FinerSoluti
 def _compared(solution: Solution, finer: FinerSolution) -> tuple[Solution, str]:
     """The solution with an error estimate, and why (b) does not hold, or ""."""
     estimate, difference = error_of_cost(solution, finer), abs(finer.known - finer.cost)
-    if solution.cost > finer.known:  # the cost of a free duration includes w T
-        estimate *= finer.known / solution.cost
     compared = with_estimate(solution, estimate)
     assert solution.problem is not None
     if difference <= RESOLVED * max(abs(solution.cost), least_cost(solution.problem)):

@@ -21,6 +21,7 @@ import numpy as np
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError
 from hovi.planning.search.continuation import STOPPED, how_ended
+from hovi.planning.solver.outcome.cost_with_time import price_of_time
 from hovi.planning.solver.solver import Solution
 from hovi.planning.solver.status import Status
 from hovi.system.dataclass import dataclass
@@ -91,7 +92,7 @@ class FreeDuration:
 
 @dataclass(frozen=True, eq=False)
 class BestDuration:
-    """The motion at the best duration, its cost without w T.
+    """The motion at the best duration.
 
     steps: of the optimiser, in all solves. ending: words of the message before the duration.
     reason: why the search ended early; "" if it did not, or if the motion is not a minimum.
@@ -108,10 +109,10 @@ class BestDuration:
     at_jump: bool = False
 
     def with_time(self) -> Solution:
-        """The motion as a solution whose cost includes w T."""
+        """The motion as a solution whose cost includes w T, and whose message says so."""
         best, weight = self.solution, self.free.weight
         T = best.trajectory.duration
-        cost = best.cost + weight * T
+        cost = action_of(best) + weight * T
         parts = f"{cost:.10g}, {weight * T:.6g} of it for time, after {self.steps} steps"
         message = f"{best.message} {self.ending} {T:.10g} s."
         if best.success:
@@ -171,7 +172,7 @@ class _Trial:
     @property
     def total(self) -> float:
         """J + w T."""
-        return self.solution.cost + self.weight * self.duration
+        return action_of(self.solution) + self.weight * self.duration
 
     @property
     def slope(self) -> float:
@@ -383,6 +384,12 @@ def _jumps(a: _Trial, b: _Trial) -> bool:
     step = abs(a.duration - b.duration)
     explained = max(2 * max(abs(a.slope), abs(b.slope)) * step, MIN_JUMP * abs(a.total))
     return a.gap_to(b) <= JUMP_BRACKET and abs(a.total - b.total) > explained
+
+
+def action_of(solution: Solution) -> float:
+    """J of a motion, its cost without the price of time."""
+    problem = solution.problem
+    return solution.cost - (0.0 if problem is None else price_of_time(problem))
 
 
 def ended_search(status: Status) -> str:

@@ -43,7 +43,7 @@ def free_to_tolerance(
 
     first: a solution for some duration between the bounds, on a coarse grid.
     jointly: solves for the duration, too; none if None.
-    The accuracy is that of the motion for its fixed duration, relative to the cost without w T.
+    The accuracy is that of the motion for its fixed duration, relative to the cost with w T.
     Where J' + w vanishes, an error of the duration changes the cost to second order only.
     If a later round fails, the motion within the tolerance of the round before is returned, as a
     success only if its duration `is_best`; after an interrupt it counts as none.

@@ -137,8 +137,9 @@ class Job:
     @cached_property
     def _problem(self) -> TrajectoryProblem:
         ld = DiscreteLagrangian(self.lagrangian(), self.grid)
-        clearance = self.options.clearance
-        return TrajectoryProblem(ld, self.start, self.goal, self.limits, self.via, clearance)
+        clearance, weight = self.options.clearance, self.options.time_weight
+        ends = self.start, self.goal
+        return TrajectoryProblem(ld, *ends, self.limits, self.via, clearance, weight)
 
     def __getstate__(self) -> dict[str, Any]:
         """The state without the problem, which worker processes build, and without the guess."""

@@ -18,6 +18,7 @@ from hovi.planning.search.free_duration import (
     BestDuration,
     FreeDuration,
     SolveFor,
+    action_of,
     best_duration,
     ended_search,
 )
@@ -131,7 +132,7 @@ def is_best(found: BestDuration) -> bool:
     """Whether J' + w vanishes, or pushes against a bound, the edge of feasibility or a jump."""
     free = found.free
     slope = found.solution.duration_derivative + free.weight
-    density = abs(found.solution.cost) / found.solution.trajectory.duration
+    density = abs(action_of(found.solution)) / found.solution.trajectory.duration
     small = free.weight <= SMALL_WEIGHT * density
     unit, largest = (density, SLOPE_OF_SMALL_WEIGHT) if small else (free.weight, LARGEST_SLOPE)
     if found.at_jump:
@@ -157,5 +158,5 @@ def _ending(free: FreeDuration, solution: Solution) -> str:
     bound = free.lower if slope > 0 else free.upper
     if abs(T / bound - 1) <= DURATION_PRECISION:
         return "The duration is kept at its bound,"
-    total = solution.cost + free.weight * T
+    total = action_of(solution) + free.weight * T
     return _BEST if abs(slope) <= STATIONARY_SLOPE * abs(total) / T else ""

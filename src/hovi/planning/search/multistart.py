@@ -67,8 +67,8 @@ class Solved:
 class Pool:
     """Solves a job from many guesses, in this process or in worker processes.
 
-    deadline: of all solves together. free: a duration to be found along with each motion, whose
-    price is then part of the costs; None for the job's own.
+    deadline: of all solves together. free: a duration to be found along with each motion; None for
+    the job's own.
     """
 
     job: Job
@@ -162,9 +162,7 @@ def _solve(
             method=method,
             barrier=job.barrier,
         )
-    price = 0.0 if free is None else free.weight * solution.trajectory.duration
-    cost = solution.cost + price
-    return dataclasses.replace(solution, problem=None, model=None, cost=cost)
+    return dataclasses.replace(solution, problem=None, model=None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -183,14 +181,6 @@ class Exploration:
     lost: tuple[str, ...] = ()
     first: FirstGuesses | None = None
     by_path: tuple[Trajectory, ...] = ()
-
-    def without_price(self, free: FreeDuration) -> Exploration:
-        """The same with costs without the price of time, in the same order."""
-        minima = [
-            dataclasses.replace(s, cost=s.cost - free.weight * s.trajectory.duration)
-            for s in self.minima
-        ]
-        return dataclasses.replace(self, minima=minima)
 
     def guess_of(self, motion: Trajectory) -> str:
         """What a message says of the guess of a refined motion: that of the nearest minimum."""

@@ -161,8 +161,7 @@ class Search:
         deadline = self.deadline.part(SOLVING_SHARE if whole else EXPLORATION_SHARE)
         pool = Pool(job, options.processes or default_processes(), deadline, self.free)
         first = self._first_guesses(job, deadline)
-        explored = explore(pool, first, options.starts, options.seed, self.progress)
-        return explored if self.free is None else explored.without_price(self.free)
+        return explore(pool, first, options.starts, options.seed, self.progress)
 
     def _first_guesses(self, job: Job, deadline: Deadline) -> FirstGuesses:
         """The guess, with paths around obstacles that one by name is deep in."""

@@ -32,6 +32,7 @@ from hovi.planning.solver.methods.choice import method_for, method_from
 from hovi.planning.solver.methods.method import Method, MethodResult, Report
 from hovi.planning.solver.methods.result_motion import motion_of
 from hovi.planning.solver.methods.stationary import Stationary
+from hovi.planning.solver.outcome.cost_with_time import cost_of
 from hovi.planning.solver.outcome.judge import judged
 from hovi.planning.solver.outcome.solution_summary import SolutionSummary
 from hovi.planning.solver.receding.ends import (
@@ -71,7 +72,7 @@ class Solution(SolutionSummary):
     status, message: the outcome, as a word and in a sentence; `usable` says whether ends and limits
         hold, and `violation` what does not.
     trajectory: the motion; the best one found if there is no minimum.
-    cost: the discrete action of L~, by default 1/2 integral |tau|^2.
+    cost: the discrete action of L~, by default 1/2 integral |tau|^2, plus the price of time w T.
     error_estimate: of the cost, relative; None if there is none.
     accuracy: the accuracy that was reached; None if no tolerance was given. nit: steps of the
         optimiser. n_neg: negative eigenvalues of the action's Hessian; -1 if they were not counted.
@@ -155,8 +156,7 @@ class Solution(SolutionSummary):
             old.start if start is None else as_start(start, old),
             old.goal if goal is None else as_goal(goal, old),
         )
-        central = self.central if guess is None else None
-        origin = self if guess is None else guess
+        central, origin = (self.central, self) if guess is None else (None, guess)
         again = _Again(problem, origin.trajectory.path, central, self.check, origin.model)
         if self.status is Status.STATIONARY:
             options = {"method": Stationary()} | options
@@ -367,4 +367,4 @@ def _the_guess(problem: TrajectoryProblem, path: DiscretePath, stop: Stop) -> Me
     """The guess, if a solve was stopped before any step."""
     status, reason = unfinished(stop)
     message = f"{reason}; the motion is the guess."
-    return MethodResult(problem, path, problem.ld.action(path), status, message)
+    return MethodResult(problem, path, cost_of(problem, path), status, message)

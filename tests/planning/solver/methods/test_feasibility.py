@@ -17,9 +17,10 @@ from hovi.planning.problem.limit_violation import excess_along
 from hovi.planning.problem.limits import as_limits
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.search.continuation import may_help
+from hovi.planning.solver.limits.restored_motion import unlimited_minimum
 from hovi.planning.solver.methods import feasibility
 from hovi.planning.solver.methods.bounded_search import BoundedSearch
-from hovi.planning.solver.methods.feasibility import follow, unlimited_minimum
+from hovi.planning.solver.methods.feasibility import follow
 from hovi.planning.solver.solver import Solution, solve_on_grid
 from hovi.planning.solver.status import Status
 from hovi.schemes import galerkin

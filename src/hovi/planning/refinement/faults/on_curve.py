@@ -8,6 +8,7 @@ from hovi.discrete.curve_integral import integral_along
 from hovi.discrete.trajectory import Trajectory
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.refinement.passive_torque import NEGLIGIBLE_SHARE, passive_torque
+from hovi.planning.solver.outcome.cost_with_time import cost_of, price_of_time
 from hovi.planning.solver.solver import Solution
 from hovi.schemes import is_galerkin
 
@@ -49,9 +50,9 @@ def _has_own_curve(problem: TrajectoryProblem) -> bool:
 
 
 def _costs(solution: Solution, problem: TrajectoryProblem) -> tuple[float, float]:
-    """The action, and the integral of L~ along the curve."""
+    """The cost by the action, and by the integral of L~ along the curve."""
     integral = integral_along(problem.ld.lagrangian, solution.trajectory).value
-    return problem.ld.action(solution.trajectory.path), integral
+    return cost_of(problem, solution.trajectory.path), integral + price_of_time(problem)
 
 
 def fault_of_period(solution: Solution) -> str:

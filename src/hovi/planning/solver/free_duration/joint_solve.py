@@ -17,6 +17,7 @@ from hovi.planning.solver.free_duration.timed_action import TimedAction
 from hovi.planning.solver.free_duration.timed_path import TimedPath, TimePrice, stretched_path
 from hovi.planning.solver.free_duration.timed_search import minimum_within_limits
 from hovi.planning.solver.methods.method import MethodResult
+from hovi.planning.solver.outcome.cost_with_time import cost_of, price_of_time
 from hovi.planning.solver.solver import STATIONARY_DECREASE, Solution, solution_of
 from hovi.planning.solver.status import Status, chart_sentence, status_of
 from hovi.system.blas_threads import one_blas_thread
@@ -54,8 +55,9 @@ def solve_jointly(
 ) -> Solution:
     """A motion x and a duration T that minimise S(x, T) + w T, with T between bounds.
 
-    n_neg counts the duration among the unknowns, unless it is at a bound. The cost is S alone, and
-    the solution's problem is that of its duration. The best motion so far at a limit.
+    n_neg counts the duration among the unknowns, unless it is at a bound. The cost is S, with the
+    price of time if the problem has one; the solution's problem is that of its duration. At a limit
+    it is the best motion so far.
 
     problem: one that `solves_jointly`, for any duration. path: the guess, for this duration.
     price: of time, and the bounds of T. Other arguments as of `solve_on_grid`.
@@ -99,7 +101,7 @@ def _unlimited(
     n_neg = 0 if outcome.convex else _negative_eigenvalues(objective, outcome)
     T, path = outcome.x.duration, outcome.x.path
     final = problem.on(problem.grid.stretched(T))
-    cost = outcome.value - price.weight * T
+    cost = outcome.value - price.weight * T + price_of_time(final)
     at_end = Outcome(path, cost, outcome.stop, outcome.iterations)
     status, message = status_of(final, at_end, n_neg)
     message += chart_sentence(final, path)
@@ -119,7 +121,7 @@ def _limited(
     reason = contradiction(longest, limits)
     if reason:
         message = f"no motion within the limits was found: {reason}."
-        value = problem.ld.action(guess)
+        value = cost_of(problem, guess)
         return MethodResult(problem, guess, value, Status.INFEASIBLE, message)
     return minimum_within_limits(problem, limits, guess, price, options)
 

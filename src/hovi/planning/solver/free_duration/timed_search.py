@@ -22,6 +22,7 @@ from hovi.planning.solver.methods.bounded_search import Bounded, BoundedSearch
 from hovi.planning.solver.methods.feasibility import solved_from
 from hovi.planning.solver.methods.limits_between_points import tightened, usable
 from hovi.planning.solver.methods.method import MethodResult
+from hovi.planning.solver.outcome.cost_with_time import cost_of
 from hovi.planning.solver.status import Status, unfinished
 from hovi.system.dataclass import dataclass
 from hovi.system.deadline import OutOfTimeError, raise_if_late
@@ -94,6 +95,10 @@ class TimedSearch(BoundedSearch):
         rough = dataclasses.replace(options, decrease=ROUGH_DECREASE, barrier=ROUGH_BARRIER)
         return self.minimized(self.objective(None), path, rough, None)
 
+    def back_to(self, problem: TrajectoryProblem) -> None:
+        """See BoundedSearch: to the duration of the problem."""
+        self._stretch(problem.grid.duration)
+
     def _stretch(self, duration: float) -> None:
         """Move the problem and its guess to another duration, in [s]."""
         before = self.problem.grid.duration
@@ -147,7 +152,7 @@ def _searched(search: TimedSearch) -> MethodResult:
     if not reason and outcome.stop is not Stop.STATIONARY:
         return _ended(search, outcome.stop)
     problem, x, n_neg = search.problem, outcome.x, search.negative_eigenvalues(outcome)
-    value, steps = problem.ld.action(x), search.iterations
+    value, steps = cost_of(problem, x), search.iterations
     held = f"limits hold everywhere, on {problem.grid.intervals} intervals"
     status, what = Status.MINIMUM, f"a minimum of cost {value:.10g} after {steps} steps; {held}"
     if reason:
@@ -193,7 +198,7 @@ def _at_the_points(search: TimedSearch) -> Bounded:
 def _ended(search: TimedSearch, stop: Stop) -> MethodResult:
     """The motion of the last solve, which is no minimum."""
     problem, path = search.last
-    value, steps = problem.ld.action(path), search.iterations
+    value, steps = cost_of(problem, path), search.iterations
     if stop is Stop.STATIONARY:
         status, reason = Status.INFEASIBLE, "no motion within the limits was found"
     else:

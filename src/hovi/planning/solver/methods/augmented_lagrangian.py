@@ -21,6 +21,7 @@ from hovi.planning.solver.augmented_lagrangian_rounds import (
 from hovi.planning.solver.methods.method import Method, MethodResult, Report
 from hovi.planning.solver.methods.trust_region import negative_eigenvalues
 from hovi.planning.solver.multipliers import Multipliers
+from hovi.planning.solver.outcome.cost_with_time import cost_of
 from hovi.planning.solver.status import Status, status_of
 from hovi.system.deadline import Deadline
 
@@ -46,17 +47,17 @@ class AugmentedLagrangian(Method):
     ) -> MethodResult:
         """See Method.minimize."""
         if problem.unreachable:
-            value, message = problem.ld.action(path), f"{problem.unreachable}."
+            value, message = cost_of(problem, path), f"{problem.unreachable}."
             return MethodResult(problem, path, value, Status.INFEASIBLE, message)
         rounds, history = _rounds(problem, path, options, report)
         outcome = rounds.result
         objective = ActionObjective(problem, multipliers=rounds.multipliers)
         n_neg = negative_eigenvalues(objective, outcome)
-        outcome.value, outcome.iterations = problem.ld.action(outcome.x), len(history)
+        outcome.value, outcome.iterations = cost_of(problem, outcome.x), len(history)
         status, message = constrained_status(problem, rounds, n_neg)
         polish = POLISHING_STEPS if status is Status.MINIMUM else 0
         x, known = _polished(problem, outcome.x, rounds.multipliers, polish)
-        value = problem.ld.action(x)
+        value = cost_of(problem, x)
         nit = len(history)
         return MethodResult(problem, x, value, status, message, nit, n_neg, history, known.forces)
 

@@ -80,8 +80,8 @@ class BoundedSearch:
     last: the problem and the motion of the last solve. solved: its outcome and its objective.
     points: of the central path, with a larger barrier than that of the last solution. at_level:
         whether a solve begins on one. timed: whether the duration is free.
-    along, level: see InteriorPoint. plain: see minimize_bounded. locally_infeasible: see
-        MethodResult.
+    along, level: see InteriorPoint. plain: see minimize_bounded.
+    locally_infeasible: see MethodResult.
     """
 
     timed: ClassVar[bool] = False
@@ -147,10 +147,9 @@ class BoundedSearch:
         return self._rows(FINE_HALVINGS)
 
     def _rows(self, halvings: tuple[int, int]) -> LimitRows:
-        problem = self.problem
-        space, barrier = problem.coordinates.curved_space, self.options.barrier
-        free = problem.free_ends
-        return LimitRows(problem.grid, self.limits, space, free, halvings, barrier)
+        problem, limits, barrier = self.problem, self.limits, self.options.barrier
+        space, free = problem.coordinates.curved_space, problem.free_ends
+        return LimitRows(problem.grid, limits, space, free, halvings, barrier)
 
     def no_near_rows(self) -> ClearanceRows:
         """No rows of distances yet."""
@@ -214,6 +213,9 @@ class BoundedSearch:
             if level > first and x.inner.shape == like.inner.shape
         ]
         self.points = before + points
+
+    def back_to(self, problem: TrajectoryProblem) -> None:
+        """Continue from a motion of this problem: another one where the duration is free."""
 
     def remaining_options(self) -> Options:
         """The options with the remaining time as time limit."""
@@ -317,8 +319,7 @@ class BoundedSearch:
 
         Those of limits and constraints, penalty terms of the constraints included.
         """
-        multipliers = outcome.barrier.multipliers
-        objective = self._objective_of(outcome)
+        multipliers, objective = outcome.barrier.multipliers, self._objective_of(outcome)
         if isinstance(objective, ClearedAction):
             multipliers = objective.plain(multipliers)
         limits = len(multipliers) - (0 if self.near is None else self.near.size)

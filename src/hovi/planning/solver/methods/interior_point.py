@@ -22,6 +22,7 @@ from hovi.planning.solver.methods.limits_between_points import tightened, usable
 from hovi.planning.solver.methods.method import Method, MethodResult, Report
 from hovi.planning.solver.methods.torque_rates_last import with_torque_rates_last
 from hovi.planning.solver.non_finite import non_finite_sentence
+from hovi.planning.solver.outcome.cost_with_time import cost_of
 from hovi.planning.solver.status import Status, diverged, infeasible_sentence, unfinished
 from hovi.system.deadline import Deadline, OutOfTimeError
 from hovi.system.interruption import record_interrupt
@@ -114,7 +115,7 @@ class InteriorPoint(Method):
         limits = problem.limits or no_limits(problem.coordinates)
         reason = contradiction(problem, limits)
         if reason:
-            value = problem.ld.action(path)
+            value = cost_of(problem, path)
             return MethodResult(
                 problem, path, value, Status.INFEASIBLE, infeasible_sentence(reason)
             )
@@ -141,7 +142,7 @@ def _searched(search: BoundedSearch) -> MethodResult:
         if not reason and outcome.stop is Stop.STATIONARY:  # others may just lack rows yet
             reason = search.too_close(outcome.x)
     problem, x, n_neg = search.problem, outcome.x, search.negative_eigenvalues(outcome)
-    value, nit = problem.ld.action(x), search.iterations
+    value, nit = cost_of(problem, x), search.iterations
     broken = "" if outcome.stop in STOPPED else _non_finite(search, x, value, excess)
     if broken:  # by an effect, not by the limits
         status, message = Status.DIVERGED, diverged(broken, nit)
@@ -167,7 +168,7 @@ def _searched(search: BoundedSearch) -> MethodResult:
 def _ended(search: BoundedSearch, stop: Stop) -> MethodResult:
     """The motion of the last solve."""
     problem, path = search.last
-    value, nit = problem.ld.action(path), search.iterations
+    value, nit = cost_of(problem, path), search.iterations
     status, message = _unfinished(stop, nit, value)
     return MethodResult(problem, path, value, status, message, nit, history=search.history)
 

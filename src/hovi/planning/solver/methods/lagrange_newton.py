@@ -30,6 +30,7 @@ from hovi.planning.solver.methods.augmented_lagrangian import (
     with_offset,
 )
 from hovi.planning.solver.methods.method import Method, MethodResult, Report
+from hovi.planning.solver.outcome.cost_with_time import price_of_time
 from hovi.system.dataclass import dataclass
 from hovi.system.deadline import Deadline, OutOfTimeError
 
@@ -165,6 +166,7 @@ class _Search:
         found.iterations = len(self.history)
         if not isinstance(found, ConstrainedOutcome):
             found.value = problem.ld.action(x)
+        found.value += price_of_time(problem)
         met = within(residuals, FEASIBLE_RESIDUAL, FEASIBLE_RESIDUAL)
         ended = found.stop is Stop.STATIONARY or (found.stop is Stop.ITERATION_LIMIT and met)
         reason = spurious_sentence(problem, x) if ended else ""

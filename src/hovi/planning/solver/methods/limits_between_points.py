@@ -63,11 +63,13 @@ def tightened(search: BoundedSearch, outcome: Bounded) -> tuple[Bounded, str, fl
             break
         on_grid += 1
         finer = halvings < MAX_HALVINGS
+        problem = search.problem
         coarse = excess > HALVING_EXCESS or (finer and on_grid > MAX_ROUNDS_PER_GRID)
         again = None if coarse else _solved_tighter(search, outcome, sides)
         failed = again is None or not (_goes_on(search, again) or again.stop in STOPPED)
         if failed and finer:
             halvings, on_grid = halvings + 1, 0
+            search.back_to(problem)
             again, reason = _solved_on_halves(search, outcome, sides)
         if again is None:
             break

@@ -13,6 +13,7 @@ from hovi.optimize.trust_region import Options, Stop
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.methods.method import Method, MethodResult, Report
+from hovi.planning.solver.outcome.cost_with_time import cost_of
 from hovi.planning.solver.status import Status, chart_sentence, unfinished
 from hovi.system.deadline import Deadline, OutOfTimeError, raise_if_late
 from hovi.system.interruption import record_interrupt
@@ -57,7 +58,7 @@ class Stationary(Method):
         search = _Search(ActionObjective(problem, "band"), path)
         with Deadline(options.time_limit).in_force():
             stop = search.run(options.max_iterations, report)
-        x, value = search.x, problem.ld.action(search.x)
+        x, value = search.x, cost_of(problem, search.x)
         n_neg = search.objective.negative_eigenvalues(x) if stop is Stop.STATIONARY else -1
         if stop is Stop.STATIONARY:
             status, steps = Status.STATIONARY, search.steps

@@ -11,6 +11,7 @@ from hovi.optimize.trust_region import Options, Outcome, Stop, minimize
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.methods.method import Method, MethodResult, Report
+from hovi.planning.solver.outcome.cost_with_time import price_of_time
 from hovi.planning.solver.status import chart_sentence, status_of
 from hovi.system.deadline import OutOfTimeError
 
@@ -33,6 +34,7 @@ class TrustRegion(Method):
         objective = ActionObjective(problem)
         outcome = minimize(objective, path, dataclasses.replace(options, exact=True), report)
         n_neg = 0 if outcome.convex else negative_eigenvalues(objective, outcome)
+        outcome.value += price_of_time(problem)
         status, message = status_of(problem, outcome, n_neg)
         return MethodResult(
             problem,

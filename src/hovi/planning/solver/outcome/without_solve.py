@@ -7,6 +7,7 @@ from hovi.discrete.trajectory import Trajectory
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.initial_path import guess_path
 from hovi.planning.solver.methods.method import MethodResult
+from hovi.planning.solver.outcome.cost_with_time import cost_of
 from hovi.planning.solver.solver import Solution, solution_of
 from hovi.planning.solver.status import Status, infeasible_sentence
 
@@ -18,7 +19,7 @@ def minimum_at(
 
     steps: of the optimiser. seconds: wall time.
     """
-    value = problem.ld.action(path)
+    value = cost_of(problem, path)
     message = f"a minimum of cost {value:.10g} after {steps} steps."
     result = MethodResult(problem, path, value, Status.MINIMUM, message, steps, n_neg=0)
     return solution_of(result, 0.0, seconds)
@@ -29,5 +30,5 @@ def infeasible_at_once(
 ) -> Solution:
     """The guess of a problem that is known to have no motion. reason: as a clause."""
     path, message = guess_path(problem, guess), infeasible_sentence(reason)
-    value = problem.ld.action(path)
+    value = cost_of(problem, path)
     return solution_of(MethodResult(problem, path, value, Status.INFEASIBLE, message), 0.0, 0.0)

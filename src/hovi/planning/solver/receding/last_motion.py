@@ -20,6 +20,7 @@ from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.augmented_lagrangian_rounds import FEASIBLE_RESIDUAL, within
 from hovi.planning.solver.methods.method import MethodResult
+from hovi.planning.solver.outcome.cost_with_time import cost_of
 from hovi.planning.solver.status import Status
 
 if TYPE_CHECKING:
@@ -67,7 +68,7 @@ def last_motion(
         f"the time limit was reached after {steps} steps, before a motion that meets the ends and "
         f"the limits was found; {name}, which {missed}."
     )
-    cost, status = problem.ld.action(path), Status.TIME_LIMIT
+    cost, status = cost_of(problem, path), Status.TIME_LIMIT
     return MethodResult(problem, path, cost, status, message, steps, central=central)
 
 
