@@ -146,7 +146,8 @@ class Study:
         replace: continue in the folder whatever it holds; plans of other cells leave the tables.
         progress: called with a StudyProgress after each chunk and each failure; in a notebook, a
             line under the cell by default.
-        Raises StudyError if the folder cannot be written or is in use.
+        Raises StudyError if the folder cannot be written, is in use, or holds plans of another
+        study of the same scene.
         """
         require_extra("pyarrow", "study")
         if self.samples and self.sample_format == "zarr":
@@ -165,8 +166,9 @@ class Study:
         if not replace:
             chosen = _own_folder(chosen, about)
         with used_alone(chosen), told(progress) as on_progress:
-            about.write(chosen)
-            run = StudyRun(self.cells, chosen, self.output, workers, scheduler, on_progress)
+            run = StudyRun(
+                *(self.cells, about, chosen, self.output, workers, scheduler, on_progress, replace)
+            )
             run.run()
         return StudyReport(
             chosen,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -18,6 +19,7 @@ from hovi.planning.search.planner import plan
 from hovi.planning.task_file.reading import load_task
 from hovi.robot.bundled_models import example
 from hovi.study.running import runner
+from hovi.study.running.chunks import job_of
 from hovi.study.running.progress import StudyProgress
 from hovi.study.running.work import CellJob, StudyWork
 from hovi.study.study import Study
@@ -25,7 +27,8 @@ from hovi.workers.pool import end_idle_workers
 from oracles.processes import children, is_running
 from samples.studies import digest, reaches
 
-pytest.importorskip("pyarrow")
+pa = pytest.importorskip("pyarrow")
+pq = pytest.importorskip("pyarrow.parquet")
 pytest.importorskip("pandas")
 
 
@@ -271,6 +274,76 @@ def test_another_scene_goes_to_a_folder_beside(tmp_path: Path) -> None:
     assert run().new == 0
     assert run(replace=True).folder == out
     assert digest(out) == digest(other.folder)
+
+
+def goals(count: int) -> Study:
+    axis = {"field": "goal.q[0]", "values": [0.1 * i for i in range(count)]}
+    return Study("two_link_reach", [axis])
+
+
+def test_another_study_of_the_scene_does_not_replace_the_plans_of_a_folder(tmp_path: Path) -> None:
+    goals(9).run(tmp_path, 1)
+    before, about = digest(tmp_path), (tmp_path / "study.json").read_bytes()
+    with pytest.raises(StudyError, match="holds 9 plans, of which 7 are not among the 2 of this"):
+        goals(2).run(tmp_path, 1)
+    durations = Study("two_link_reach", [{"field": "duration", "values": [1.0, 1.1]}])
+    with pytest.raises(StudyError, match="of which 9 are not among the 2 of this study and would"):
+        durations.run(tmp_path, 1)
+    assert (digest(tmp_path), (tmp_path / "study.json").read_bytes()) == (before, about)
+    assert goals(11).run(tmp_path, 1).new == 2  # more values are no other study
+    assert durations.run(tmp_path, 1, replace=True).new == 2
+    assert durations.run(tmp_path, 1).new == 0
+    assert len(Study.load(tmp_path)) == 2
+
+
+def test_another_study_does_not_continue_one_that_was_killed(tmp_path: Path) -> None:
+    goals(3).run(tmp_path, 1)
+    (tmp_path / "plans.parquet").unlink()  # written at the end
+    with pytest.raises(StudyError, match="holds 3 plans, of which 2 are not"):
+        goals(1).run(tmp_path, 1)
+    assert goals(3).run(tmp_path, 1).new == 0
+
+
+def test_the_plans_of_another_study_are_kept_without_its_journal(tmp_path: Path) -> None:
+    goals(3).run(tmp_path, 1)
+    shutil.rmtree(tmp_path / "journal")
+    with pytest.raises(StudyError, match="holds 3 plans, of which 1 are not"):
+        goals(2).run(tmp_path, 1)
+    pq.write_table(pa.table({"mine": [1.0]}), tmp_path / "plans.parquet")
+    with pytest.raises(StudyError, match="is no table of a study"):
+        goals(2).run(tmp_path, 1)
+
+
+def test_a_plan_is_on_the_disk_before_it_counts_as_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Motions before the lines that refer to them, lines before the parent is told, and names."""
+    study, unsynced = goals(2), set[str]()
+    (tmp_path / "journal").mkdir()
+    write, fsync = os.write, os.fsync
+
+    def name(descriptor: int) -> str:
+        return Path(f"/proc/self/fd/{descriptor}").readlink().name
+
+    def writing(descriptor: int, content: Any) -> int:
+        if name(descriptor).endswith(".lines"):
+            assert not [each for each in unsynced if each.endswith(".bytes")]
+        if name(descriptor).endswith((".lines", ".bytes")):
+            unsynced.add(name(descriptor))
+        return write(descriptor, content)
+
+    def syncing(descriptor: int) -> None:
+        synced.append(name(descriptor))
+        unsynced.discard(synced[-1])
+        fsync(descriptor)
+
+    synced: list[str] = []
+    monkeypatch.setattr(os, "write", writing)
+    monkeypatch.setattr(os, "fsync", syncing)
+    work = StudyWork(study.cells.template, str(tmp_path), study.output, "run")
+    work(tuple(job_of(study.cells.cell(number)) for number in range(2)))
+    assert [Path(each).suffix for each in synced] == ["", ".bytes", "", ".bytes", ".lines"]
+    assert not unsynced
 
 
 def test_two_runs_do_not_use_one_folder(tmp_path: Path) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import math
+from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -57,6 +58,7 @@ def _from_csv(path: Path, names: list[str]) -> list[list[Any]]:
     header = [name.strip() for name in rows[0]] if rows else []
     places = [_place(name, header, path) for name in names]
     values: list[list[Any]] = [[] for _ in names]
+    lines = []
     for number, row in enumerate(rows[1:], start=2):
         if not row:
             continue  # a blank line
@@ -64,9 +66,27 @@ def _from_csv(path: Path, names: list[str]) -> list[list[Any]]:
             raise SceneError(
                 f"{path}, line {number}: {len(row)} values under {len(header)} names of columns."
             )
+        lines.append(number)
         for column, place in zip(values, places, strict=True):
             column.append(_number_or_text(row[place].strip()))
+    for name, column in zip(names, values, strict=True):
+        _require_one_kind(name, column, lines, path)
     return values
+
+
+def _require_one_kind(name: str, column: list[Any], lines: list[int], path: Path) -> None:
+    """Raise SceneError if one value is a text where others are numbers, or the like.
+
+    The column of the study's table would have only texts then.
+    """
+    kinds = ["truth values" if isinstance(x, bool) else _WORDS[type(x)] for x in column]
+    usual = max(kinds, key=Counter(kinds).__getitem__, default="")
+    for line, value, kind in zip(lines, column, kinds, strict=True):
+        if kind != usual:
+            raise SceneError(
+                f"{path}, line {line}: the other values of column {name!r} are {usual}, but this "
+                f"one is {value!r}: correct it, or take the line out."
+            )
 
 
 def _number_or_text(text: str) -> Any:
@@ -131,4 +151,5 @@ def _place(name: str, header: list[str], path: Path) -> int:
     return header.index(name)
 
 
+_WORDS = {int: "numbers", float: "numbers", str: "texts"}
 _READERS = {".csv": _from_csv, ".parquet": _from_parquet}

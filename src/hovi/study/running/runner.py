@@ -16,11 +16,13 @@ from hovi.study.running.from_neighbours import FromNeighbours
 from hovi.study.running.in_order import InOrder
 from hovi.study.running.progress import OnProgress, StudyProgress
 from hovi.study.running.work import CellJob, Output, Receipt, StudyWork
+from hovi.study.storage.folder import About
 from hovi.study.storage.index import Index
 from hovi.study.storage.journal import JournalWriter, StorageError
-from hovi.study.storage.tables import write_tables
+from hovi.study.storage.tables import PLANS, require_own, write_tables
 from hovi.system.dataclass import dataclass
 from hovi.system.deadline import Deadline
+from hovi.system.files import names_file
 from hovi.workers.lost import Lost
 from hovi.workers.pool import results_from
 
@@ -34,14 +36,17 @@ class StudyRun:
     folder: of the study, which no other run uses. workers: number of worker processes.
     scheduler: the address of a Dask scheduler, or "local" for a cluster on this machine; None for
         processes of hovi's own.
+    replace: whether plans of other cells may leave the tables.
     """
 
     cells: Cells
+    about: About
     folder: Path
     output: Output
     workers: int
     scheduler: str | None
     on_progress: OnProgress
+    replace: bool = False
     progress: StudyProgress = field(init=False)
     given_up: tuple[tuple[CellJob, str], ...] = ()
     interrupted: bool = False
@@ -52,13 +57,17 @@ class StudyRun:
     def run(self) -> None:
         """Plan what is missing, and write the tables; an interrupt ends it early.
 
-        Raises StudyError if nothing can be written any more; what is done stays.
+        Raises StudyError if nothing can be written any more; what is done stays. And if the folder
+        holds plans of another study, unless these may be replaced.
         """
         index = Index(self.folder, self.output.samples)
         index.read_new()
         kind = FromNeighbours if self.cells.warm else InOrder
         chunks = kind(self.cells, index, self.output, self.workers)
         self.progress.before = self.progress.done = self._count_done(chunks)
+        if not self.replace:
+            require_own(self.folder, chunks.keys, index)
+        self.about.write(self.folder)
         self.progress.take(0)
         try:
             self._report()
@@ -77,7 +86,7 @@ class StudyRun:
 
     def _count_done(self, chunks: Chunks) -> int:
         """How many cells are done. Sets the keys of all of them."""
-        if len(chunks.index) == 0:
+        if len(chunks.index) == 0 and not names_file(self.folder / PLANS):
             return 0
         numbers = range(self.cells.count)
         return sum(chunks.is_stored(chunks.cell(number).key) for number in numbers)
@@ -136,6 +145,7 @@ class StudyRun:
         writer = JournalWriter(self.folder)
         try:
             writer.add(entry)
+            writer.sync()
         finally:
             writer.close()
 

@@ -110,7 +110,9 @@ class StudyWork:
     def __call__(self, chunk: tuple[CellJob, ...], left: float | None = None) -> list[Receipt]:
         """Plan the cells of a chunk. Raises StorageError, and MemoryError."""
         desk = _desk(self.folder, self.run, self.template.hash)
-        return [self._do(job, desk) for job in chunk]
+        receipts = [self._do(job, desk) for job in chunk]
+        desk.writer.sync()
+        return receipts
 
     def _do(self, job: CellJob, desk: _Desk) -> Receipt:
         began, wall, processor = datetime.now(UTC), time.perf_counter(), time.process_time()

@@ -72,6 +72,10 @@ class Index:
     def __len__(self) -> int:
         return len(self._lines)
 
+    def keys(self) -> list[str]:
+        """The keys of all plans that are done."""
+        return list(self._lines)
+
     def done(self, key: str) -> Done | None:
         """A plan; None if it is not done. Raises StudyError."""
         line = self._lines.get(key)

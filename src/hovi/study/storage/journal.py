@@ -1,8 +1,9 @@
 """What workers write as they go: a file of lines each, and a file of what lines refer to.
 
 A line is one JSON object after its CRC-32 in eight hexadecimal digits. It is written by one call
-after the bytes that it refers to, so a process that is killed leaves lines that are whole, and at
-most one that is not, which readers pass over. Every process writes to files of its own.
+after the bytes that it refers to are on the disk, so a process that is killed and a machine that
+loses its power leave lines that are whole, and at most one that is not, which readers pass over.
+Every process writes to files of its own.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from pathlib import Path
 from typing import Any, Self
 
 from hovi.system.dataclass import dataclass
+from hovi.system.files import sync_folder
 
 FOLDER = "journal"
 """Of the lines and of what they refer to, in a study's folder."""
@@ -66,6 +68,7 @@ class JournalWriter:
     name: str = field(default_factory=lambda: _new_name())
     _lines: int = -1
     _bytes: int = -1
+    _unsynced: set[int] = field(default_factory=set)
 
     def store(self, content: bytes) -> Stored:
         """Add bytes. Raises StorageError."""
@@ -74,11 +77,25 @@ class JournalWriter:
         return Stored(self.name, self._append(self._bytes, content), len(content))
 
     def add(self, entry: dict[str, Any]) -> None:
-        """Add a line. Raises StorageError."""
+        """Add a line, which is on the disk after the next `sync`. Raises StorageError."""
+        self._sync(self._bytes)
         if self._lines < 0:
             self._lines = self._open(LINES)
         text = json.dumps(entry, allow_nan=False, separators=(",", ":")).encode()
         self._append(self._lines, b"%08x %s\n" % (zlib.crc32(text), text))
+
+    def sync(self) -> None:
+        """Wait until all that was added is on the disk. Raises StorageError."""
+        for descriptor in (self._bytes, self._lines):
+            self._sync(descriptor)
+
+    def _sync(self, descriptor: int) -> None:
+        if descriptor in self._unsynced:
+            try:
+                os.fsync(descriptor)
+            except OSError as refused:
+                raise StorageError(str(refused)) from refused
+            self._unsynced.remove(descriptor)
 
     def close(self) -> None:
         """Close the files."""
@@ -90,14 +107,17 @@ class JournalWriter:
     def _open(self, suffix: str) -> int:
         path = self.folder / FOLDER / f"{self.name}{suffix}"
         try:
-            return os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND | os.O_CLOEXEC, 0o666)
+            opened = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND | os.O_CLOEXEC, 0o666)
         except OSError as refused:
             raise StorageError(str(refused)) from refused
+        sync_folder(path.parent)
+        return opened
 
     def _append(self, descriptor: int, content: bytes) -> int:
         """Write all bytes or none; returns where they begin."""
         end = os.fstat(descriptor).st_size
         rest = memoryview(content)
+        self._unsynced.add(descriptor)
         try:
             while rest:
                 rest = rest[os.write(descriptor, rest) :]

@@ -55,6 +55,30 @@ def write_tables(
         _write_samples(folder, keys, index, sample_format)
 
 
+def require_own(folder: Path, keys: Keys, index: Index) -> None:
+    """Raise StudyError if a folder holds plans of other cells, which would leave the tables.
+
+    keys: of all cells. index: of the folder, whose plans count where there is no table yet.
+    """
+    texts = _keys_in(folder / PLANS) if names_file(folder / PLANS) else index.keys()
+    held = np.array(texts, dtype=keys.dtype)
+    others = int(np.isin(held, keys, invert=True).sum())
+    if others:
+        raise StudyError(
+            f"{folder} holds {len(held):,} plans, of which {others:,} are not among the "
+            f"{len(keys):,} of this study and would leave {PLANS}: choose another folder, or use "
+            "--replace (replace=True in Python)."
+        )
+
+
+def _keys_in(path: Path) -> list[str]:
+    """The keys in plans.parquet. Raises StudyError where that is another kind of table."""
+    table = read_table(path)
+    if "key" not in table.column_names:
+        raise StudyError(f"{path} is no table of a study: choose another folder.")
+    return [str(key) for key in table["key"].to_pylist()]
+
+
 def read_table(path: Path) -> pa.Table:
     """A table of a study. Raises StudyError."""
     import pyarrow as pa
