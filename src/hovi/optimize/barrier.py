@@ -155,7 +155,7 @@ class Barrier:
         )
         for z, former in ((whole.zl, self.zl), (whole.zu, self.zu)):
             z[:old] = former[kept]
-            z[old:] = np.maximum(z[old:], np.where(known, former[origin], 0.0))
+            z[old:][known] = np.maximum(z[old:][known], former[origin[known]])
         return whole._clipped()
 
     def handed_on(self, y: Array, new: Index, beside: Index) -> Barrier:

@@ -25,7 +25,7 @@ from hovi.planning.refinement.passive_torque import (
     PassiveTorque,
     passive_torque,
 )
-from hovi.planning.refinement.whirling import Whirl, whirl
+from hovi.planning.refinement.whirling import Whirl, whirl_without_limits
 from hovi.planning.solver.limits.limit_rows import MAX_LOSS
 from hovi.planning.solver.outcome.cost_with_time import price_of_time
 from hovi.planning.solver.solver import Solution
@@ -144,8 +144,7 @@ class Candidate:
     @cached_property
     def whirl(self) -> Whirl | None:
         """The joint that whirls; None if none does, and for limited problems."""
-        problem = self.solution.problem
-        return None if problem is None or problem.limited else whirl(self.solution)
+        return None if self.solution.problem is None else whirl_without_limits(self.solution)
 
     @property
     def larger_error(self) -> float:

@@ -129,6 +129,13 @@ def whirl(solution: Solution) -> Whirl | None:
     return Whirl(name, speed, float(ratio[worst]), inertia)
 
 
+def whirl_without_limits(solution: Solution) -> Whirl | None:
+    """The joint that whirls most; None if none does, and within limits. Distances are no limits."""
+    assert solution.problem is not None
+    limits = solution.problem.limits
+    return None if limits is not None and limits.bounded.any() else whirl(solution)
+
+
 def fault_of_whirling(
     solution: Solution, error: float | None, finer: FinerSolution | None = None
 ) -> str:
@@ -137,8 +144,7 @@ def fault_of_whirling(
     error: relative error of the cost; None if the cost is only rounding. finer: the finer solution
         that it was compared with; None to compute it.
     """
-    assert solution.problem is not None
-    whirling = None if solution.problem.limited else whirl(solution)
+    whirling = whirl_without_limits(solution)
     if whirling is None:
         return ""
     if not whirling.is_trusted(error):
@@ -217,9 +223,9 @@ def _distance(solution: Solution, finer: FinerSolution) -> float:
 def whirl_without_minimum(solution: Solution) -> Whirl | None:
     """The joint that whirls hopelessly in a motion at its iteration limit; None if none does."""
     problem = solution.problem
-    if solution.status is not Status.ITERATION_LIMIT or problem is None or problem.limited:
+    if solution.status is not Status.ITERATION_LIMIT or problem is None:
         return None
-    found = whirl(solution)
+    found = whirl_without_limits(solution)
     hopeless = found is not None and found.is_hopeless(grids=0, alone=0, nearly_resolved=False)
     return found if hopeless else None
 

@@ -8,9 +8,11 @@ from collections.abc import Iterator
 from hovi.discrete.grid import Grid
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError
+from hovi.planning.clearance.clearance_violation import near_pairs
 from hovi.planning.paths.first_guesses import FirstGuesses, first_guesses
+from hovi.planning.refinement.error_estimate import with_metadata
 from hovi.planning.refinement.hp_refinement import galerkin_with_more_points
-from hovi.planning.refinement.resolution import resolved, unresolved_if_whirling
+from hovi.planning.refinement.resolution import Resolution, resolved, unresolved_if_whirling
 from hovi.planning.refinement.whirling import whirl_without_minimum
 from hovi.planning.search.continuation import STOPPED, UNUSABLE, may_help, solve_by_continuation
 from hovi.planning.search.final_stages import (
@@ -25,6 +27,7 @@ from hovi.planning.search.free_duration import FreeDuration
 from hovi.planning.search.job import Job, split_for_charts
 from hovi.planning.search.multistart import Exploration, Pool, default_processes, explore
 from hovi.planning.solver.initial_path import guess_path
+from hovi.planning.solver.methods.active_pairs import with_clearance
 from hovi.planning.solver.solver import Solution
 from hovi.planning.solver.status import Status
 from hovi.system.dataclass import dataclass
@@ -54,11 +57,42 @@ class Search:
     free: FreeDuration | None = None
 
     def run(self) -> tuple[Solution, tuple[float, ...]]:
-        """The best solution, and the costs of all minima on the requested grid."""
+        """The best solution, and the costs of all minima on the requested grid.
+
+        Most motions keep links apart without being asked to. So where that is asked, the motion
+        without is found first, which takes less time and is a minimum of both problems then.
+        """
+        if not self.fine.options.self_collision:
+            return self._run()
+        free = dataclasses.replace(self, fine=self.fine.with_options(self_collision=False))
+        best, costs = free._run()
+        try:
+            whole = self._of_whole(best)
+        except OutOfTimeError:
+            why = "the time limit was reached before distances between links were looked at"
+            return ended_early(best, Status.TIME_LIMIT, why), ()
+        return self._run() if whole is None else (whole, costs)
+
+    def _of_whole(self, free: Solution) -> Solution | None:
+        """A solution without self-collision as one with; None if links come too near in it."""
+        clearance, problem = self.fine.options.clearance, free.problem or self.fine.problem()
+        problem = with_clearance(on_grid_of(problem, free), clearance)
+        assert problem.distances is not None
+        kept = dataclasses.replace(free, problem=problem)
+        ended = free.status in (*STOPPED, Status.INFEASIBLE) or interrupted()
+        if not ended and len(near_pairs(free.trajectory, problem.distances, clearance.margin)) > 0:
+            return None
+        motion = with_metadata(free.trajectory, clearance=clearance.to_dict())
+        kept = dataclasses.replace(kept, trajectory=motion)
+        known = free.check is not None and free.error_estimate is not None
+        return dataclasses.replace(kept, check=Resolution.of(kept, None)) if known else kept
+
+    def _run(self) -> tuple[Solution, tuple[float, ...]]:
+        """As `run`, with all distances from the beginning."""
         job = self._coarse()
         explored = self._explored(job)
         if self._needs_more_points(explored):
-            return dataclasses.replace(self, fine=with_more_points(self.fine)).run()
+            return dataclasses.replace(self, fine=with_more_points(self.fine))._run()
         if self.free is None or explored.minima[0].success:
             return self._finished(job, explored)
         return self._from_another_duration(self.free, explored)

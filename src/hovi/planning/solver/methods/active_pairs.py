@@ -56,6 +56,22 @@ def with_active_pairs(
     return _Rounds(solve, problem, options, report).run(path)
 
 
+def without_pairs(
+    solve: Solve,
+    problem: TrajectoryProblem,
+    path: DiscretePath,
+    options: Options,
+    report: Report | None = None,
+) -> MethodResult | None:
+    """The motion of a problem without limits that keeps its distances of itself; else None.
+
+    It is not looked for where a guess does not keep them. Arguments as for `with_active_pairs`.
+    """
+    if problem.distances is None or contradiction(problem, no_limits(problem.coordinates)):
+        return None
+    return _Rounds(solve, problem, options, report).free(path)
+
+
 class _Rounds:
     """The solves so far. nit, history: of all of them."""
 
@@ -89,6 +105,18 @@ class _Rounds:
             chosen = np.union1d(chosen, more)
             result = self._again(result, chosen, path if free else None)
         return result
+
+    def free(self, path: DiscretePath) -> MethodResult | None:
+        """A solve without any pair; None where one is too close, before or after it."""
+        try:
+            if len(self._too_close(self._problem, path, FIRST_BEYOND)) > 0:
+                return None
+            result = self._solved(self._problem, path, np.zeros(0, dtype=np.intp))
+            minimum = result.status in (Status.MINIMUM, Status.SADDLE)
+            close = minimum and len(self._too_close(result.problem, result.path)) > 0
+        except OutOfTimeError:
+            return None
+        return None if close else result
 
     def _violating(self, result: MethodResult, chosen: Index) -> Index:
         """If other pairs violate the margin: those, and the pairs that are near."""
@@ -128,17 +156,17 @@ class _Rounds:
         """A solve with some pairs; its problem has all of them again."""
         whole = problem.clearance
         assert whole is not None
-        part = _with_clearance(problem, PartOfClearance.of(whole, chosen.tolist()))
+        part = with_clearance(problem, PartOfClearance.of(whole, chosen.tolist()))
         options = self._options_left()
         if part.limited:
             result = self._solve(part, path, options)
         else:
             method = next(method for method in WITHOUT_LIMITS if method.supports(part))
             result = method.minimize(part, path, options, self._report)
-        return dataclasses.replace(result, problem=_with_clearance(result.problem, whole))
+        return dataclasses.replace(result, problem=with_clearance(result.problem, whole))
 
 
-def _with_clearance(problem: TrajectoryProblem, clearance: Clearance) -> TrajectoryProblem:
+def with_clearance(problem: TrajectoryProblem, clearance: Clearance) -> TrajectoryProblem:
     """The same problem with other pairs, sharing what was built for this one."""
     other = copy.copy(problem)  # only its finer one depends on them, too
     object.__setattr__(other, "clearance", clearance)

@@ -15,7 +15,7 @@ from hovi.planning.problem.contradictions import contradiction
 from hovi.planning.problem.limits import no_limits
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.central_path import CentralPath
-from hovi.planning.solver.methods.active_pairs import with_active_pairs
+from hovi.planning.solver.methods.active_pairs import with_active_pairs, without_pairs
 from hovi.planning.solver.methods.bounded_search import BoundedSearch
 from hovi.planning.solver.methods.feasibility import feasible_motion
 from hovi.planning.solver.methods.limits_between_points import tightened, usable
@@ -38,8 +38,7 @@ STEPS_AT_POINTS = 200
 
 def takes_rows(problem: TrajectoryProblem) -> bool:
     """Whether distances can be bounded by rows where pairs come near."""
-    limited = problem.limits is not None and bool(problem.limits.bounded.any())
-    return problem.distances is not None and problem.ld.chart is None and limited
+    return problem.distances is not None and problem.ld.chart is None
 
 
 class InteriorPoint(Method):
@@ -96,6 +95,13 @@ class InteriorPoint(Method):
         if self.distances == "points":
             return rounds(problem, path, at_points)
         deadline = Deadline(options.time_limit)
+        if problem.limits is None or not problem.limits.bounded.any():
+            free = without_pairs(
+                partial(self._minimize, report=report), problem, path, options, report
+            )
+            if free is not None:
+                return free
+            options = dataclasses.replace(options, time_limit=deadline.seconds_left)
         found = self._minimize(problem, path, options, report, lazy=True)
         if self.distances == "rows" or found.status not in WITHOUT_MOTION:
             return found
