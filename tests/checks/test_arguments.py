@@ -128,8 +128,12 @@ def test_arguments_by_position_are_checked_too() -> None:
 
 
 def test_lists_become_arrays_and_arrays_are_passed_on() -> None:
-    given = np.zeros((3, 2))[:, ::2]
+    given = np.zeros((3, 2))
     assert function(array=given)["array"] is given
+    for strided in (given[:, ::2], given.T, given[::-1]):
+        passed_on = function(array=strided)["array"]
+        assert passed_on.flags.c_contiguous
+        np.testing.assert_array_equal(passed_on, strided)
     converted = function(array=[1, 2])["array"]
     assert converted.dtype == np.float64
     listed = [np.zeros(2), np.zeros(3)]

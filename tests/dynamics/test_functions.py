@@ -13,6 +13,7 @@ import pytest
 from hovi.dynamics import symbolic_dynamics
 from hovi.dynamics.extension import check_version
 from hovi.errors import HoviError, ModelError
+from hovi.robot.model import frame_id
 
 FIXED_BASE = [
     "double_pendulum",
@@ -99,8 +100,8 @@ def test_frame_placements_match_pinocchio(case: Case) -> None:
         for q, _, _ in case.points:
             pin.framesForwardKinematics(case.model, data, q)
             R, p = placement(q)
-            # Names may repeat: the function takes the first frame of a name.
-            index = case.functions.frames.index(case.model.frames[index].name)
+            # names may repeat
+            index = frame_id(case.model, case.model.frames[index].name)
             assert_equal(R, data.oMf[index].rotation)
             assert_equal(p, data.oMf[index].translation)
 

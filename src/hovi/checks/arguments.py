@@ -27,8 +27,9 @@ def check_arguments(checked: Checked) -> Checked:
     """A decorator: arguments that are not what their annotations say raise InputError.
 
     Any real number is accepted as a float, and a whole one as an int. What NumPy converts to an
-    array of numbers is accepted as an array, which the function then receives. Arguments annotated
-    by Any, or by a name that only type checkers import, are not checked.
+    array of numbers is accepted as an array, which the function then receives, C-contiguous; masked
+    entries are refused. Arguments annotated by Any, or by a name that only type checkers import,
+    are not checked.
 
     checked: a function; or a class, whose constructor and public methods are checked unless they
         have a decorator of their own.

@@ -17,6 +17,9 @@ from hovi.system.dataclass import dataclass
 
 MAX_WHOLE_NUMBER = 10**18
 """Largest magnitude of an integer: larger ones overflow in compiled code."""
+MAX_DIMENSIONS = 64
+"""Of an array of NumPy."""
+_NESTING = (list, tuple, np.ma.MaskedArray)
 _QUOTED = (str, bool, int, float, types.NoneType)
 _ARRAY_LIKE = set(get_args(npt.ArrayLike))
 
@@ -90,7 +93,8 @@ def shown(value: Any) -> str:
         text = repr(value) if not isinstance(value, int) or abs(value) < 10**40 else "an integer"
         return text if len(text) <= 80 else f"{text[:60]}..."
     if isinstance(value, np.ndarray):
-        return f"an array of {value.dtype} of shape {value.shape}"
+        masked = "a masked" if isinstance(value, np.ma.MaskedArray) else "an"
+        return f"{masked} array of {value.dtype} of shape {value.shape}"
     name = f"class {value.__name__}" if isinstance(value, type) else type(value).__name__
     return _with_article(name)
 
@@ -129,6 +133,8 @@ def _number(value: Any) -> Any:
         return value
     if isinstance(value, np.ndarray) and value.ndim == 0:
         value = value[()]
+    if value is np.ma.masked:
+        raise MismatchError("a number that is not masked")
     if not isinstance(value, numbers.Real) or isinstance(value, bool | np.timedelta64):
         raise MismatchError
     try:
@@ -201,12 +207,13 @@ def _union(members: Sequence[Kind | None]) -> Kind | None:
     ordered = sorted(kinds, key=lambda kind: kind.words.startswith(_ARRAY_OF))
 
     def accept(value: Any) -> Any:
+        precise: MismatchError | None = None
         for kind in kinds if isinstance(value, np.ndarray) else ordered:
             try:
                 return kind.accept(value)
-            except MismatchError:
-                continue
-        raise MismatchError
+            except MismatchError as mismatch:
+                precise = mismatch if mismatch.args else precise
+        raise precise or MismatchError
 
     *most, last = dict.fromkeys(kind.words for kind in kinds)
     return Kind(f"{', '.join(most)} or {last}" if most else last, accept)
@@ -218,16 +225,37 @@ def _array(dtype: np.dtype[Any]) -> Kind:
 
     def accept(value: Any) -> Any:
         if type(value) is np.ndarray and (value.dtype is dtype or value.dtype == dtype):
-            return value
+            return compact(value)
+        if _masks(value):
+            raise MismatchError(f"{words}, none of them masked")
         try:
             array = np.asarray(value)
         except Exception as error:  # an object may raise anything
             raise MismatchError from error
         if array.dtype.kind not in allowed and array.size:
             raise MismatchError
-        return array.astype(dtype)
+        return array.astype(dtype, order="C")
 
     return Kind(f"{_ARRAY_OF} {words}", accept)
+
+
+def compact(array: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """The array as compiled code takes it: itself, or a copy if not C-contiguous and aligned."""
+    flags = array.flags
+    return array if flags.c_contiguous and flags.aligned else array.copy()
+
+
+def _masks(value: Any, depth: int = 0) -> bool:
+    """Whether entries of an array, or of one in nested lists, are masked.
+
+    NumPy converts to what is behind the mask.
+    """
+    if isinstance(value, np.ma.MaskedArray):
+        return bool(np.ma.is_masked(value))
+    if not isinstance(value, list | tuple) or depth > MAX_DIMENSIONS:
+        return False
+    nested = any(issubclass(kind, _NESTING) for kind in set(map(type, value)))
+    return nested and any(_masks(each, depth + 1) for each in value)
 
 
 def _array_like(others: set[Any]) -> Kind | None:

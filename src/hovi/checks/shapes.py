@@ -15,15 +15,16 @@ Array = npt.NDArray[np.float64]
 
 
 def numbers_of(name: str, value: npt.ArrayLike, *shape: int | None) -> Array:
-    """`value` as an array of doubles.
+    """`value` as a C-contiguous array of doubles.
 
     name: of the argument, for the message. shape: None stands for any length, nothing for any
     shape. Raises InputError.
     """
     try:
         array: Array = NUMBERS.accept(value)
-    except MismatchError:
-        raise InputError(f"{name} must be numbers, got {shown(value)}.") from None
+    except MismatchError as mismatch:
+        words = mismatch.args[0] if mismatch.args else "numbers"
+        raise InputError(f"{name} must be {words}, got {shown(value)}.") from None
     if shape:
         require_shape(name, array, *shape)
     return array

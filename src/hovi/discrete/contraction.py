@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi._native import intervals as native
+from hovi.checks.kinds import compact
 from hovi.discrete.instants import InstantBatch, InstantCharts
 from hovi.discrete.interval_batch import IntervalBatch
 from hovi.discrete.interval_charts import Charts
@@ -28,7 +29,8 @@ class Expansion:
 
     values: L_d, shape (N,). gradient: shape (N, m, n). hessian: shape (N, m, m, n, n).
     outputs: y and its Jacobian at the quadrature points, one pair per batch, for lifted Newton
-        steps; they have no rows if the Lagrangian has no outputs.
+        steps and for compiled code, which needs them C-contiguous; they have no rows if the
+        Lagrangian has no outputs.
     charts: of the intervals, one per batch; None if the chart is the identity.
     points: of the Lagrangian at the quadrature points, one per batch; None if they were not kept.
     """
@@ -39,6 +41,10 @@ class Expansion:
     outputs: list[tuple[Array, Array]]
     charts: list[AnyCharts] | None = None
     points: list[PointExpansion] | None = None
+
+    def __post_init__(self) -> None:
+        outputs = [(compact(y), compact(J)) for y, J in self.outputs]
+        object.__setattr__(self, "outputs", outputs)
 
     @property
     def action(self) -> float:

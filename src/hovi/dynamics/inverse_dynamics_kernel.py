@@ -18,7 +18,6 @@ from hovi.errors import InputError, ModelError
 from hovi.robot.space.joint_kinds import kind_of
 
 Array = npt.NDArray[np.float64]
-DOUBLE = np.dtype(np.float64)
 
 
 def joints_without_kernel(model: pin.Model) -> tuple[str, ...]:
@@ -155,8 +154,7 @@ class InverseDynamicsKernel:
 
 def _numbers(name: str, x: Array, shape: tuple[int, ...] | None = None) -> Array:
     """x as contiguous doubles of a shape; None for any of one dimension or more."""
-    if not (type(x) is np.ndarray and x.dtype is DOUBLE and x.flags.c_contiguous and x.ndim > 0):
-        x = np.ascontiguousarray(numbers_of(name, x))
+    x = np.atleast_1d(numbers_of(name, x))
     if shape not in (None, x.shape):
         raise InputError(f"{name} must have shape {shape}, got {x.shape}.")
     return x

@@ -11,7 +11,7 @@ import pinocchio as pin
 
 from hovi._native import kinematics as native
 from hovi.dynamics.joint_tree import axes_of, frames_along
-from hovi.robot.model import frame_id
+from hovi.robot.model import frame_named
 from hovi.robot.space.groups import SO2
 from hovi.robot.space.joint_kinds import kind_of
 from hovi.system.dataclass import dataclass
@@ -90,7 +90,7 @@ class KinematicChain:
 
 def read_kinematic_chain(model: pin.Model, frame: str) -> KinematicChain | None:
     """The chain of a frame; None if one of its joints has no fixed axis, or mimics another."""
-    tip = model.frames[frame_id(model, frame)]
+    tip = frame_named(model, frame)
     joints = list(model.supports[tip.parentJoint])[1:]
     if not joints or any(kind_of(model.joints[i]).kernel != "anywhere" for i in joints):
         return None

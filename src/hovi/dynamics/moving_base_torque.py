@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
+from hovi.checks.kinds import compact
 from hovi.dynamics.mimic_kernel import rnea_kernel
 from hovi.dynamics.point_function import PointFunction, default_threads
 from hovi.dynamics.symbolic_dynamics import casadi_functions
@@ -78,14 +79,14 @@ class MovingBaseTorque:
 
     def torque(self, q: Array, v: Array, a: Array, t: Array | None = None) -> Array:
         """tau, shape (P, nv)."""
-        return self.kernel.torque(*self._on_base(q, v, a, t))[:, BASE_DOF:]
+        return compact(self.kernel.torque(*self._on_base(q, v, a, t))[:, BASE_DOF:])
 
     def linearize(
         self, q: Array, v: Array, a: Array, t: Array | None = None
     ) -> tuple[Array, Array]:
         """tau and its Jacobian."""
         tau, J = self.kernel.linearize(*self._on_base(q, v, a, t))
-        return tau[:, BASE_DOF:], J[:, BASE_DOF:, self._columns]
+        return compact(tau[:, BASE_DOF:]), compact(J[:, BASE_DOF:, self._columns])
 
     def expand(
         self,
@@ -105,7 +106,8 @@ class MovingBaseTorque:
         curvature = np.concatenate([zeros, curvature], axis=1)
         tau, J, H = self.kernel.expand(*jet, weight, curvature, self._threads)
         kept = self._columns
-        return tau[:, BASE_DOF:], J[:, BASE_DOF:, kept], H[:, kept[:, None], kept]
+        own = tau[:, BASE_DOF:], J[:, BASE_DOF:, kept], H[:, kept[:, None], kept]
+        return compact(own[0]), compact(own[1]), compact(own[2])
 
     def _on_base(self, q: Array, v: Array, a: Array, t: Array | None) -> tuple[Array, Array, Array]:
         jets = zip(self._jet(times(t, len(q))), (q, v, a), strict=True)

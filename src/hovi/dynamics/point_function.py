@@ -64,7 +64,7 @@ class PointFunction:
     def __call__(self, *arguments: Array) -> list[Array]:
         """Evaluate at P points; arguments of shape (P, width). Raises InputError for others."""
         name = f"an argument of {self.function.name()}"
-        arrays = [np.ascontiguousarray(numbers_of(name, each)) for each in arguments]
+        arrays = [np.atleast_1d(numbers_of(name, each)) for each in arguments]
         points = len(arrays[0])
         self._check(arrays, points)
         results = [np.empty((points, *reversed(shape))) for shape in self._shapes]
@@ -131,8 +131,8 @@ def _dense(function: ca.Function) -> ca.Function:
 
 
 def _squeeze(result: Array) -> Array:
-    """(P, c, r) from column-major memory to (P, r, c), (P, r) or (P,)."""
+    """(P, c, r) from column-major memory to (P, r, c), (P, r) or (P,), C-contiguous."""
     _, columns, rows = result.shape
     if columns == 1:
         return result[:, 0, 0] if rows == 1 else result[:, 0, :]
-    return result.transpose(0, 2, 1)
+    return np.ascontiguousarray(result.transpose(0, 2, 1))

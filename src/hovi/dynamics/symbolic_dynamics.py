@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import cached_property
 from typing import Any
 
@@ -12,6 +12,7 @@ import pinocchio as pin
 from hovi.dynamics.extension import SymbolicModel, archive
 from hovi.errors import ModelError, nearest
 from hovi.robot.mimic_model import CoordinateMap, uncoupled
+from hovi.robot.model import frame_ids
 from hovi.system.dataclass import dataclass
 
 _OutputMap = Callable[[casadi.SX, casadi.SX], list[casadi.SX]]
@@ -27,13 +28,13 @@ class RigidBodyFunctions:
 
     text: Pinocchio's archive of the model; of the uncoupled model if there are mimic joints, which
         archives of Pinocchio 4.1 do not restore.
-    frames: the model's frame names, in Pinocchio's order.
+    frames: Pinocchio's index of each frame, by name.
     coordinate_map: from the model's coordinates to those of the uncoupled model; None without mimic
         joints.
     """
 
     text: str
-    frames: tuple[str, ...]
+    frames: Mapping[str, int]
     coordinate_map: CoordinateMap | None = None
 
     @cached_property
@@ -73,7 +74,7 @@ class RigidBodyFunctions:
             raise ModelError(
                 f"the robot has no frame {frame_name!r}: {nearest(frame_name, self.frames)}"
             )
-        index = self.frames.index(frame_name)
+        index = self.frames[frame_name]
         return self._reduced(casadi.Function.deserialize(self._model.frame_placement(index)))
 
     def _reduced(
@@ -113,7 +114,7 @@ def casadi_functions(model: pin.Model) -> RigidBodyFunctions:
 
     Raises BuildMismatchError unless the installed Pinocchio is the version hovi was compiled with.
     """
-    frames = tuple(frame.name for frame in model.frames)
+    frames = frame_ids(model)
     if not len(model.mimicking_joints):
         return RigidBodyFunctions(archive(model), frames)
     free = uncoupled(model)

@@ -21,7 +21,7 @@ Array = npt.NDArray[np.float64]
 
 
 class TorqueModel(Protocol):
-    """tau(q, v, a, t) with its derivatives in the tangent space."""
+    """tau(q, v, a, t) with its derivatives in the tangent space, as C-contiguous arrays."""
 
     def torque(self, q: Array, v: Array, a: Array, t: Array | None = None) -> Array:
         """tau, shape (P, nv), in [N m] or [N]."""

@@ -10,6 +10,7 @@ import pinocchio as pin
 from hovi.effects.effect import Effect, Touch, bracketed
 from hovi.effects.expressions.frame_motion import require_frame
 from hovi.errors import SceneError
+from hovi.robot.model import frame_named
 from hovi.system.dataclass import dataclass
 
 if TYPE_CHECKING:
@@ -38,7 +39,7 @@ class Payload(Effect):
     def check(self, robot: Robot) -> None:
         """Raise SceneError for an unknown or fixed frame."""
         require_frame(robot, self.key, self.frame)
-        if robot.model.frames[robot.model.getFrameId(self.frame)].parentJoint == 0:
+        if frame_named(robot.model, self.frame).parentJoint == 0:
             raise SceneError(
                 f"effect 'payload': frame {self.frame!r} is fixed to the base, where a payload "
                 "changes nothing; name a frame that a joint moves."
@@ -69,7 +70,7 @@ class Payload(Effect):
 
     def configure(self, model: pin.Model, robot: Robot) -> None:
         """Add the inertia of the body to the model."""
-        frame = model.frames[model.getFrameId(self.frame)]
+        frame = frame_named(model, self.frame)
         body = pin.Inertia(self.mass, np.array(self.center), self._tensor())
         model.inertias[frame.parentJoint] += frame.placement.act(body)
 

@@ -24,6 +24,7 @@ from hovi.dynamics.point_function import PointFunction
 from hovi.dynamics.symbolic_dynamics import casadi_functions
 from hovi.errors import InputError, SceneError
 from hovi.flows.legendre_transforms import total_derivative
+from hovi.robot.model import frame_ids
 from hovi.robot.space.configuration_rate import bracket_on, rate_on
 from hovi.robot.space.configuration_space import ConfigurationSpace
 from hovi.robot.space.joint_kinds import kind_of
@@ -208,8 +209,9 @@ def _trunk(scene: Scene) -> list[int]:
 def _joint_axes(scene: Scene, joint: int, q: ca.SX) -> ca.SX:
     """The twists per unit speed of a joint in the world, (velocity at the origin, rotation)."""
     model = scene.model
+    named = ((name, model.frames[index]) for name, index in frame_ids(model).items())
     frame = next(
-        f.name for f in model.frames if f.parentJoint == joint and f.placement.isIdentity(1e-15)
+        name for name, f in named if f.parentJoint == joint and f.placement.isIdentity(1e-15)
     )
     R, p = casadi_functions(model).frame_placement(frame)(q)
     data = model.createData()

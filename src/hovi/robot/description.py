@@ -13,7 +13,7 @@ import pinocchio as pin
 from hovi.robot.mass_matrix import light_joints
 from hovi.robot.mimic_model import couplings_of
 from hovi.robot.mimic_tags import held_values
-from hovi.robot.model import couplings_in
+from hovi.robot.model import ambiguous_frames, couplings_in, frame_named
 from hovi.robot.source import RobotSource
 from hovi.robot.space.angle_ranges import ranges_in_degrees
 from hovi.robot.space.joint_kinds import ANGLE, FLOATING, kind_of
@@ -23,6 +23,7 @@ from hovi.robot.urdf.spelling import ignored_names
 Array = npt.NDArray[np.float64]
 
 _MOST_FRAMES = 12
+_FRAME_WORDS = {pin.BODY: "link", pin.OP_FRAME: "frame", pin.SENSOR: "sensor"}
 _WIDTH = 79
 _ROW = "  {:<{width}}  {:<11}{:>10}{:>10}{:>11}{:>10}"
 
@@ -130,6 +131,12 @@ def _notes(model: pin.Model, source: RobotSource) -> Iterator[str]:
             "angle, an orientation a unit quaternion (x, y, z, w)"
         )
     yield from _suspicious_ranges(pairs, model)
+    for name in ambiguous_frames(model):
+        taken = _FRAME_WORDS.get(frame_named(model, name).type, "joint")
+        yield (
+            f"several frames are named {name!r}: the name stands for the {taken}, and not for "
+            "those elsewhere"
+        )
     for what, limit in (("velocity", model.velocityLimit), ("effort", model.effortLimit)):
         zero = np.flatnonzero(np.asarray(limit) == 0.0)
         if len(zero):

@@ -16,6 +16,8 @@ from hovi.robot.urdf.normalize import plain_urdf
 
 Array = npt.NDArray[np.float64]
 
+_FRAME_KINDS = (pin.BODY, pin.OP_FRAME, pin.SENSOR, pin.JOINT, pin.FIXED_JOINT)
+"""Kinds of frames, those whose name counts before others' first."""
 POSITION_TOLERANCE = 1e-9
 """Distance by which a joint may be locked outside its range, in [rad] or [m]."""
 
@@ -167,10 +169,43 @@ def joint_ids(model: pin.Model, names: Iterable[str]) -> list[int]:
     return [model.getJointId(name) for name in names]
 
 
+def frame_ids(model: pin.Model) -> dict[str, int]:
+    """Pinocchio's index of the frame that each name stands for.
+
+    Pinocchio itself refuses a name that several frames have, such as a link and a joint of a URDF.
+    Here it is the link's, else that of the first of `_FRAME_KINDS` with the name, and the first of
+    these. `ambiguous_frames` names those that are elsewhere.
+    """
+    frames = sorted(enumerate(model.frames), key=lambda each: _FRAME_KINDS.index(each[1].type))
+    found: dict[str, int] = {}
+    for index, frame in frames:
+        found.setdefault(str(frame.name), index)
+    return found
+
+
 def frame_id(model: pin.Model, name: str) -> int:
-    """Pinocchio's index of a frame; that of the link if a joint has the same name."""
-    same = [i for i, frame in enumerate(model.frames) if frame.name == name]
-    return next((i for i in same if model.frames[i].type == pin.BODY), same[0])
+    """Pinocchio's index of a frame: see `frame_ids`. Raises ModelError for an unknown name."""
+    found = frame_ids(model)
+    if name not in found:
+        raise ModelError(f"the robot has no frame {name!r}: {nearest(name, found)}")
+    return found[name]
+
+
+def frame_named(model: pin.Model, name: str) -> pin.Frame:
+    """The frame that a name stands for: see `frame_ids`. Raises ModelError for an unknown name."""
+    return model.frames[frame_id(model, name)]
+
+
+def ambiguous_frames(model: pin.Model) -> tuple[str, ...]:
+    """Names of frames that further frames at other places have too."""
+    found = frame_ids(model)
+
+    def elsewhere(frame: pin.Frame) -> bool:
+        named = model.frames[found[str(frame.name)]]
+        same = frame.parentJoint == named.parentJoint and frame.placement == named.placement
+        return not same
+
+    return tuple(dict.fromkeys(str(frame.name) for frame in model.frames if elsewhere(frame)))
 
 
 def _with_armature(model: pin.Model, armature: Iterable[tuple[str, float]]) -> pin.Model:

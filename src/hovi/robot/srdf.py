@@ -21,7 +21,7 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from hovi.errors import InputError, ModelError, nearest
-from hovi.robot.model import frame_id
+from hovi.robot.model import frame_named
 from hovi.robot.urdf.rules import MAX_MAGNITUDE, is_decimal
 from hovi.system.dataclass import dataclass
 from hovi.system.files import reason, require_file
@@ -136,7 +136,7 @@ def parse_srdf(text: str, name: str = "robot.srdf") -> Srdf:
 def _own_joint(model: pin.Model, link: str, group: str) -> set[str]:
     """The joint between a link and its parent, if it moves."""
     _supports(model, link, group)
-    frame = model.frames[frame_id(model, link)]
+    frame = frame_named(model, link)
     fixed = model.frames[frame.parentFrame].type != pin.JOINT
     return set() if fixed else {str(model.names[frame.parentJoint])}
 
@@ -145,7 +145,7 @@ def _supports(model: pin.Model, link: str, group: str) -> tuple[str, ...]:
     """The joints between the world and a link. Raises ModelError for an unknown one."""
     if not any(frame.name == link for frame in model.frames):
         raise ModelError(f"group {group!r} of the SRDF names link {link!r}, which does not exist.")
-    joint = model.frames[frame_id(model, link)].parentJoint
+    joint = frame_named(model, link).parentJoint
     return tuple(str(model.names[index]) for index in list(model.supports[joint])[1:])
 
 

@@ -15,7 +15,7 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from hovi.robot.mimic_model import couplings_of
-from hovi.robot.model import frame_id
+from hovi.robot.model import frame_named
 
 END_EFFECTORS = {
     "tool",
@@ -68,14 +68,14 @@ def is_end_effector_name(frame: str) -> bool:
 
 def is_moved(model: pin.Model, frame: str) -> bool:
     """Whether there is a joint between the world and a frame."""
-    return bool(model.frames[frame_id(model, frame)].parentJoint > 0)
+    return bool(frame_named(model, frame).parentJoint > 0)
 
 
 def moves_frame(model: pin.Model, frame: str) -> npt.NDArray[np.bool_]:
     """Which entries of v move a frame, (nv,); for a joint that mimics another, its leader's."""
     found = np.zeros(model.nv, dtype=bool)
     leaders = {coupling.follower: coupling.leader for coupling in couplings_of(model)}
-    for joint in list(model.supports[model.frames[frame_id(model, frame)].parentJoint])[1:]:
+    for joint in list(model.supports[frame_named(model, frame).parentJoint])[1:]:
         name = str(model.names[joint])
         member = model.joints[model.getJointId(leaders.get(name, name))]
         found[member.idx_v : member.idx_v + member.nv] = True

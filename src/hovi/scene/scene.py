@@ -14,6 +14,7 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from hovi.checks.arguments import check_arguments_except
+from hovi.checks.shapes import numbers_of
 from hovi.dynamics.mimic_kernel import rnea_kernel, without_rnea_kernel
 from hovi.dynamics.moving_base_torque import MovingBaseTorque, inverse_dynamics, on_base_joints
 from hovi.dynamics.torque_model import AnalyticTorque, CasadiTorque, SummedTorque, TorqueModel
@@ -149,7 +150,7 @@ class Scene:
 
     def _effort_weight(self, given: npt.ArrayLike | None) -> Array:
         """R, or the one of the effects."""
-        R = self.terms.effort_weight if given is None else np.asarray(given, dtype=np.float64)
+        R = self.terms.effort_weight if given is None else numbers_of("weight", given)
         if R.shape != (self.robot.nv,) or not (np.isfinite(R).all() and (R >= 0).all()):
             raise SceneError(
                 f"weight needs {self.robot.nv} numbers of 0 or more, one per joint coordinate, "
@@ -169,8 +170,8 @@ class Scene:
 
         q: shape (M, nq). v, a: shape (M, nv). t: shape (M,), in [s].
         """
-        q, v, a = (np.asarray(x, dtype=np.float64) for x in (q, v, a))
-        return self.torques.torque(q, v, a, None if t is None else np.asarray(t, dtype=np.float64))
+        jet = numbers_of("q", q), numbers_of("v", v), numbers_of("a", a)
+        return self.torques.torque(*jet, None if t is None else numbers_of("t", t))
 
     def without(self, key: str) -> Scene:
         """The same scene without one of its effects."""

@@ -11,7 +11,7 @@ import pinocchio as pin
 
 from hovi.discrete.measures.segment_spans import segment_spans
 from hovi.discrete.trajectory import Trajectory
-from hovi.robot.model import frame_id
+from hovi.robot.model import frame_named
 from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
 from hovi.system.dataclass import dataclass
@@ -56,7 +56,7 @@ class Payloads:
             return visual
         both = visual.copy()
         for k, (name, mass, center) in enumerate(self.items):
-            frame = robot.model.frames[frame_id(robot.model, name)]
+            frame = frame_named(robot.model, name)
             at = frame.placement * pin.SE3(np.eye(3), np.array(center, dtype=float))
             radius = (3.0 * max(mass, 1e-6) / (4.0 * np.pi * _DENSITY)) ** (1.0 / 3.0)
             item = pin.GeometryObject(_name(k), frame.parentJoint, at, coal.Sphere(radius))

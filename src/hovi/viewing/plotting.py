@@ -28,7 +28,7 @@ from hovi.errors import DisplayError, expect
 from hovi.planning.problem.limit_violation import at_limit
 from hovi.planning.problem.limits import KINDS, Limits
 from hovi.planning.solver.solver import Solution
-from hovi.robot.model import frame_id
+from hovi.robot.model import frame_named
 from hovi.robot.robot import Robot
 from hovi.system.dataclass import dataclass
 from hovi.viewing.curves.colors import COLORS
@@ -239,7 +239,7 @@ def _names(trajectory: Trajectory) -> tuple[str, ...]:
 def _chain(robot: Robot, q: Array) -> Array:
     """Origins of the joints from base to tip, and the tip, shape (links + 1, M, 3), in [m]."""
     model = robot.model
-    tip = model.frames[frame_id(model, robot.tip_frame)]
+    tip = frame_named(model, robot.tip_frame)
     joints = [joint for joint in model.supports[tip.parentJoint] if joint != 0]
     data, points = model.createData(), np.empty((len(joints) + 1, len(q), 3))
     for i, configuration in enumerate(q):

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from hovi.accuracy.effect_study.candidates import check_frames_move, effect_candidates
 from hovi.discrete.trajectory import Trajectory
 from hovi.effects import Effect, Touch
-from hovi.errors import InputError, SceneError
+from hovi.errors import HoviError, InputError, SceneError
 from hovi.flows.execution.tracking import play
 from hovi.planning.solver.solver import Solution
 from hovi.planning.task_file.task import Task
@@ -71,6 +71,17 @@ class EffectTrial:
         return f"{'+' if self.added else '-'} {self.effect.key}"
 
 
+@dataclass(frozen=True)
+class FailedTrial:
+    """A candidate effect with which nothing was found, such as one that the limits do not allow.
+
+    reason: one sentence.
+    """
+
+    effect: Effect
+    reason: str
+
+
 @dataclass(frozen=True, eq=False)
 class EffectStudy:
     """The motion of a scene and one trial per candidate effect.
@@ -78,6 +89,7 @@ class EffectStudy:
     task: the task. solution: its motion. seconds: of an evaluation with derivatives, per point.
     plan_seconds: of planning it again from its own motion.
     untried: candidates not reached before the time limit or an interrupt.
+    failed: candidates whose trial ended with an error.
     """
 
     task: Task
@@ -86,6 +98,7 @@ class EffectStudy:
     plan_seconds: float
     trials: tuple[EffectTrial, ...]
     untried: tuple[Effect, ...] = ()
+    failed: tuple[FailedTrial, ...] = ()
 
     def change(self, trial: EffectTrial) -> float:
         """Relative change of the cost; NaN if no minimum was found with the effect."""
@@ -109,6 +122,7 @@ def study_effects(
     time_limit: of the whole study, in [s], shared evenly by the remaining candidates; none is
         started when time is up. By default a candidate is planned in at most ten times the time
         of the task, at least 10 s. A KeyboardInterrupt ends the study with the trials so far.
+    A candidate that fails is among `failed`, and the others are tried.
     Raises SceneError when no motion of the task itself is found, and InputError for a candidate at
     a frame that cannot move.
     """
@@ -133,7 +147,7 @@ def study_effects(
     replan_seconds = time.perf_counter() - began
     scenes = [_with_or_without(scene, effect) for effect in tried]
     own_seconds, *times = seconds_per_point([scene, *scenes])
-    trials: list[EffectTrial] = []
+    trials, failed = list[EffectTrial](), list[FailedTrial]()
     try:
         for i, (effect, changed, seconds) in enumerate(zip(tried, scenes, times, strict=True)):
             report(f"trying {effect.key}", (1 + i) / (1 + len(tried)))
@@ -141,11 +155,20 @@ def study_effects(
             limit = default_limit if rest is None else rest / (len(tried) - i)
             if limit <= 0:
                 break
-            trials.append(_trial(task, solution.trajectory, effect, changed, seconds, limit))
+            try:
+                trials.append(_trial(task, solution.trajectory, effect, changed, seconds, limit))
+            except Exception as error:  # an effect may be a user's own
+                failed.append(FailedTrial(effect, _sentence(error)))
     except KeyboardInterrupt:
         record_interrupt()
-    untried = tried[len(trials) :]
-    return EffectStudy(task, solution, own_seconds, replan_seconds, tuple(trials), untried)
+    untried = tried[len(trials) + len(failed) :]
+    found = tuple(trials), untried, tuple(failed)
+    return EffectStudy(task, solution, own_seconds, replan_seconds, *found)
+
+
+def _sentence(error: Exception) -> str:
+    """An error in words; with its kind if it is not one that hovi raises."""
+    return str(error) if isinstance(error, HoviError) else f"{type(error).__name__}: {error}"
 
 
 def _with_or_without(scene: Scene, effect: Effect) -> Scene:

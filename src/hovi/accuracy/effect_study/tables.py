@@ -101,6 +101,7 @@ def study_json(study: EffectStudy) -> str:
         "plan_seconds": study.plan_seconds,
         "trials": trials,
         "untried": [effect.key for effect in study.untried],
+        "failed": [{"effect": each.effect.key, "reason": each.reason} for each in study.failed],
     }
     return json.dumps(fields, allow_nan=False)
 

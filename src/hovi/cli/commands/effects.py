@@ -36,7 +36,7 @@ def effects(
     """Add each candidate effect alone to a scene, and tabulate the changes and evaluation times.
 
     Effects of the scene are removed instead. Ctrl-C ends the study with the trials so far. Exit
-    code 0, 1 when candidates are left untried, or 2 for invalid input.
+    code 0, 1 when candidates failed or are left untried, or 2 for invalid input.
     """
     from hovi.accuracy.effect_study.study import study_effects
     from hovi.accuracy.effect_study.tables import plot_study, study_json
@@ -61,7 +61,7 @@ def effects(
         _print(study)
         if out is not None:
             print(f"wrote {out}")
-    raise typer.Exit(1 if study.untried else 0)
+    raise typer.Exit(1 if study.untried or study.failed else 0)
 
 
 def _print(study: EffectStudy) -> None:
@@ -73,5 +73,7 @@ def _print(study: EffectStudy) -> None:
     for trial in study.trials:
         print(f"{'+' if trial.added else '-'} {trial.effect.describe()}")
     print(study_note(study))
+    for each in study.failed:
+        print(f"! {each.effect.key} failed: {each.reason}")
     if study.untried:
         print(f"not tried: {', '.join(effect.key for effect in study.untried)}")

@@ -52,7 +52,10 @@ class ConvexParts(Obstacle):
             raise InputError(
                 f"`radius` of convex parts must be a length of 0 or more, got {self.radius!r}."
             )
-        if not isinstance(self.parts, Sequence) or not 0 < len(self.parts) <= MAX_PARTS:
+        if (
+            not isinstance(self.parts, Sequence | np.ndarray)
+            or not 0 < len(self.parts) <= MAX_PARTS
+        ):
             raise InputError(f"`parts` of convex parts must be 1 to {MAX_PARTS} lists of points.")
         object.__setattr__(self, "parts", tuple(ConvexHull(each).points for each in self.parts))
 

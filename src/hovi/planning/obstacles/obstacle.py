@@ -170,7 +170,7 @@ def turned_to(direction: Array) -> Array:
 
 
 def _short(value: object) -> str:
-    words = repr(value)
+    words = " ".join(repr(value).split())
     return words if len(words) <= 200 else f"{words[:200]}..."
 
 

@@ -17,6 +17,7 @@ import pinocchio as pin
 from hovi.planning.clearance.clearance_violation import TOUCHING, distance_in_words
 from hovi.planning.clearance.distances import Distances, Pair
 from hovi.planning.problem.frame_goal import FrameGoal
+from hovi.robot.model import frame_named
 
 POINT = coal.Sphere(0.0)
 
@@ -28,7 +29,7 @@ def goal_distances(goal: FrameGoal, distances: Distances) -> dict[Pair, float]:
     """
     if goal.position is None:
         return {}
-    frame = distances.robot.model.frames[distances.robot.model.getFrameId(goal.frame)]
+    frame = frame_named(distances.robot.model, goal.frame)
     at = np.asarray(goal.position, dtype=float)
     objects, found = distances.geometry.geometryObjects, dict[Pair, float]()
     for pair, (first, second) in zip(distances.pairs, distances.ends, strict=True):

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi._native import groups as native
+from hovi.checks.kinds import compact
 from hovi.robot.space.groups import Layout
 from hovi.system.dataclass import dataclass
 
@@ -24,8 +25,8 @@ def rates(
     the rates of q(t) (+) x(t).
     """
     out = np.empty((2, *x.shape[1:]))
-    moving = None if base_rates is None else np.ascontiguousarray(base_rates)
-    native.rates(layout, np.ascontiguousarray(x), moving, out, portable)
+    moving = None if base_rates is None else compact(base_rates)
+    native.rates(layout, compact(x), moving, out, portable)
     return out[0], out[1]
 
 
@@ -34,8 +35,7 @@ def local_rates(
 ) -> tuple[Array, Array]:
     """(x', x'') of curves at x with velocities v and accelerations a, all (P, n)."""
     out = np.empty((2, *x.shape))
-    rows = np.ascontiguousarray(x), np.ascontiguousarray(v), np.ascontiguousarray(a)
-    native.local_rates(layout, *rows, out, portable)
+    native.local_rates(layout, compact(x), compact(v), compact(a), out, portable)
     return out[0], out[1]
 
 

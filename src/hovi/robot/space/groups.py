@@ -138,7 +138,7 @@ def _common_rows(*arrays: Array) -> tuple[int, ...]:
 def _rows(x: Array, lead: tuple[int, ...]) -> Array:
     """(..., n) as contiguous rows (P, n)."""
     full = x if x.shape[:-1] == lead else np.broadcast_to(x, (*lead, x.shape[-1]))
-    return np.ascontiguousarray(numbers_of("rows", full)).reshape(-1, x.shape[-1])
+    return numbers_of("rows", full).reshape(-1, x.shape[-1])
 
 
 _COORDINATES = ("x", "y", "z", "rx", "ry", "rz")

@@ -81,6 +81,7 @@ class Remainder:
             (begun.inner, path.inner[rest:]),
         )
         q, v, z, inner = (np.concatenate(part) for part in parts)
+        inner = inner[:, : self.grid.inner_modes]  # the intervals that have more may have passed
         higher = path.higher
         if higher.size:
             higher = np.concatenate([begun.higher[:1], higher[rest:]])
