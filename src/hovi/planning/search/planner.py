@@ -149,7 +149,11 @@ def plan(
     if FrameGoal in map(type, given):
         ends = chosen_ends(scene, *given, T, chosen, deadline)
         job = search.job(ends, deadline, job.scene if ends[0] is job.start else None)
-    solution = run(Search(job, deadline, progress or silent, free), began)
+    without = None
+    if chosen.self_collision:
+        loose = dataclasses.replace(search, options=chosen.with_changes(self_collision=False))
+        without = loose.job((job.start, job.goal), deadline, job.scene)
+    solution = run(Search(job, deadline, progress or silent, free, without), began)
     return with_notes(solution, [job.scene], job.options)
 
 

@@ -49,12 +49,14 @@ class Search:
 
     fine: the requested job, with the guess among its options. deadline: of the whole search.
     free: bounds of a free duration; None for a given one.
+    without: the same without self-collision, which is searched first; None where there is none.
     """
 
     fine: Job
     deadline: Deadline
     progress: Progress
     free: FreeDuration | None = None
+    without: Job | None = None
 
     def run(self) -> tuple[Solution, tuple[float, ...]]:
         """The best solution, and the costs of all minima on the requested grid.
@@ -62,10 +64,9 @@ class Search:
         Most motions keep links apart without being asked to. So where that is asked, the motion
         without is found first, which takes less time and is a minimum of both problems then.
         """
-        if not self.fine.options.self_collision:
+        if self.without is None:
             return self._run()
-        free = dataclasses.replace(self, fine=self.fine.with_options(self_collision=False))
-        best, costs = free._run()
+        best, costs = dataclasses.replace(self, fine=self.without)._run()
         try:
             whole = self._of_whole(best)
         except OutOfTimeError:

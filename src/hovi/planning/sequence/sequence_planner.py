@@ -110,7 +110,8 @@ def plan_sequence(
     job = job_of(scene, begin, goals, parts, chosen)
     job.problem()  # raises for invalid input before the search
     warn_of_ends(scene.robot, job.start, job.goal, job.options)
-    solution = run(Search(job, deadline, progress or silent), began)
+    without = job.with_options(self_collision=False) if chosen.self_collision else None
+    solution = run(Search(job, deadline, progress or silent, None, without), began)
     scenes = [part.acting.on(job.scene) for part in job.parts]
     return _named(with_notes(solution, scenes, job.options), parts)
 
