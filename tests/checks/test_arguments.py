@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+from collections import deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -76,13 +77,31 @@ ACCEPTED: dict[str, tuple[Any, ...]] = {
     "either": (np.zeros(2), [np.zeros(2), np.zeros(3)]),
     "anything": (None, 1, Robot(), "x"),
 }
+BOOLEANS: tuple[Any, ...] = (
+    *([1.0, True], [[0, 1], [False, 2]], [np.True_, 1.0], deque([1, True])),
+    *((np.array(True), 1), [np.array([True, False]), [1, 2]]),
+)
+"""Truth values among numbers, which NumPy takes as 0 and 1."""
 REFUSED: dict[str, tuple[Any, ...]] = {
     "number": (None, "1", True, 1j, [1.0], 10**400, np.zeros(2), Robot()),
     "whole": (None, "1", True, 1.5, float("nan"), float("inf"), 10**30, np.array(1.5)),
     "truth": (None, 0, 1, "True", np.array([True, False])),
     "text": (None, b"a", 1, ["a"]),
     "maybe": (1, "robot", Robot),
-    "array": (None, "1", ["1"], [None], 1j, [1j], [True], {}, [[1], [2, 3]], b"1", Robot()),
+    "array": (
+        None,
+        "1",
+        ["1"],
+        [None],
+        1j,
+        [1j],
+        [True],
+        {},
+        [[1], [2, 3]],
+        b"1",
+        Robot(),
+        *BOOLEANS,
+    ),
     "numbers": (None, 1.0, "12", b"12", ["a"], [None], {1.0: 2.0}, np.array(1.0), iter([1.0])),
     "names": (None, 1, [1], ["a", None], b"ab"),
     "by_name": (None, [], [("a", 1)], {1: 1}, {"a": "b"}),

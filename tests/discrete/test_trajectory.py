@@ -271,6 +271,11 @@ BROKEN: dict[str, tuple[Callable[[Entries], object], str]] = {
     "a step too many": (array("steps", lambda x: np.append(x, 0.1)), "one scheme per interval"),
     "negative step": (array("steps", lambda x: -x), "positive"),
     "NaN": (array("q", spoil(np.nan)), "'q': holds numbers that are not finite"),
+    "inner modes beyond any motion": (
+        array("inner", spoil(1e300)),
+        r"inner has 1e\+300, beyond the largest number",
+    ),
+    "velocities beyond any motion": (array("v", spoil(-1e200)), r"v has 1e\+200, beyond"),
     "infinite": (array("momenta", spoil(np.inf)), "not finite"),
     "single precision": (array("q", lambda x: x.astype(np.float32)), "expected float64"),
     "text for numbers": (array("q", lambda x: x.astype(str)), "expected float64"),

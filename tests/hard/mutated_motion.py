@@ -102,7 +102,7 @@ def verdict(mutant: Mutant, folder: Path) -> tuple[Verdict, str]:
 
 def error_in(motion: Trajectory, folder: Path) -> str:
     """The error in a loaded motion; "" if there is none."""
-    sample = motion.sample(np.linspace(0.0, motion.duration, 7))
+    sample = motion.sample(np.linspace(0.0, motion.duration, 50))
     if not all(np.isfinite(part).all() for part in sample):
         return "its samples are not finite"
     inner = np.arange(motion.grid.intervals - 1)
@@ -252,6 +252,14 @@ def _not_finite(entries: Entries, random: Random) -> None:
     entries[name] = _npy(array)
 
 
+def _beyond(entries: Entries, random: Random) -> None:
+    """an array holds numbers beyond any motion"""
+    name = random.choice(("q", "v", "z", "inner"))
+    array = _array_of(entries, name)
+    array.flat[random.randrange(array.size)] = random.choice((1e300, -1e308, 1e155, 1e60))
+    entries[name] = _npy(array)
+
+
 def _steps(entries: Entries, random: Random) -> None:
     """a step is not positive"""
     array = _array_of(entries, "steps")
@@ -308,7 +316,7 @@ def _number(entries: Entries, random: Random) -> None:
 
 
 _INVALIDATING_CHANGES: tuple[Change, ...] = (
-    *(_not_finite, _steps, _jump, _type, _pickle, _bomb, _scene, _number),
+    *(_not_finite, _beyond, _steps, _jump, _type, _pickle, _bomb, _scene, _number),
 )
 
 # Changes to another motion, which only the hash of the contents shows; the docstring is the reason

@@ -234,6 +234,8 @@ def _array(dtype: np.dtype[Any]) -> Kind:
             raise MismatchError from error
         if array.dtype.kind not in allowed and array.size:
             raise MismatchError
+        if dtype.kind != "b" and _has_booleans(value):
+            raise MismatchError
         return array.astype(dtype, order="C")
 
     return Kind(f"{_ARRAY_OF} {words}", accept)
@@ -256,6 +258,14 @@ def _masks(value: Any, depth: int = 0) -> bool:
         return False
     nested = any(issubclass(kind, _NESTING) for kind in set(map(type, value)))
     return nested and any(_masks(each, depth + 1) for each in value)
+
+
+def _has_booleans(value: Any) -> bool:
+    """Whether there is a truth value in nested sequences, which NumPy takes as 0 or 1."""
+    if isinstance(value, Sequence) and not isinstance(value, str | bytes):
+        others = set(map(type, value)) - {float, int}
+        return bool(others) and any(map(_has_booleans, value))
+    return isinstance(value, bool | np.bool_) or getattr(value, "dtype", None) == np.bool_
 
 
 def _array_like(others: set[Any]) -> Kind | None:

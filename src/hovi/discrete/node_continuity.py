@@ -13,8 +13,18 @@ from hovi.robot.space.configuration_space import ConfigurationSpace
 
 Array = npt.NDArray[np.float64]
 
+MAX_NUMBER = 1e50
+"""Largest magnitude in a motion: squares of torques of more would overflow."""
 TOLERANCE = 1e-6
 """Relative to the largest coordinate; an unmodified motion deviates by rounding only."""
+
+
+def require_moderate(path: DiscretePath) -> None:
+    """Raise InputError for numbers beyond any motion, of which samples would not be finite."""
+    for name in ("q", "v", "z", "inner", "higher"):
+        most = np.abs(getattr(path, name)).max(initial=0.0)
+        if most > MAX_NUMBER:
+            raise InputError(f"{name} has {most:.3g}, beyond the largest number, {MAX_NUMBER:g}")
 
 
 def require_continuous(

@@ -212,6 +212,9 @@ def test_a_robot_that_holds_the_same_is_the_same(panda: hovi.Robot) -> None:
         (lambda: crate(inertia=[-1, 1, 1, 0, 0, 0]), "must not have a negative principal value"),
         (lambda: crate(may_touch=[3]), "`may_touch` of grasped object 'crate' must be a list"),
         (lambda: crate(name=""), "needs a name"),
+        (lambda: crate(name="a\0b"), "name of a grasped object must be printable characters"),
+        (lambda: crate(shape={"kind": "sphere", "position": [0, 0, 0], "radius": 1e-300}), "1e-09"),
+        (lambda: crate(position=[0, True, 0]), "position must be numbers"),
         (lambda: hovi.Clearance(may_touch=["ab"]), "a list of pairs of different names"),
     ],
 )

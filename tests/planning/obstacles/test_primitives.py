@@ -98,6 +98,13 @@ def test_a_half_space_is_drawn_as_a_slab_under_its_plane() -> None:
     [
         (lambda: hovi.Cylinder(0.0, 1.0, AT), "`radius` of a cylinder must be positive"),
         (lambda: hovi.Cylinder(1.0, "long", AT), "`length` of a cylinder must be a number"),
+        (lambda: hovi.Sphere(AT, 1e-300), r"must be at least 1e-09, in metres, got 1e-300"),
+        (lambda: hovi.Box([1, 1e-10, 1], AT), r"must be at least 1e-09, in metres"),
+        (lambda: hovi.Box([1, True, 1], AT), "`size` of a box must be 3 finite numbers"),
+        (lambda: hovi.Sphere([0.0, False, 0.0], 1.0), "`position` of a sphere must be 3 finite"),
+        (lambda: hovi.ConvexHull([*CORNERS, [True, 0, 0]]), "`points` of a convex hull must be"),
+        (lambda: hovi.Sphere(AT, 1.0, name="a\0b"), "name of a sphere must be printable"),
+        (lambda: hovi.Segment([0.0], 1.0, name="\x1b[2J"), "name of a segment must be printable"),
         (lambda: hovi.HalfSpace([0, 0, 0]), "`normal` of a half space must be a direction"),
         (lambda: hovi.HalfSpace([0, 1]), "`normal` of a half space must be 3 finite numbers"),
         (lambda: hovi.ConvexHull([[0, 0, 0]] * 9), "must span a volume"),

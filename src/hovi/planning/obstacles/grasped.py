@@ -13,6 +13,7 @@ import pinocchio as pin
 
 from hovi.checks.arguments import check_arguments_except
 from hovi.checks.kinds import shown
+from hovi.checks.names import require_name
 from hovi.checks.shapes import numbers_of
 from hovi.checks.tables import entries_of
 from hovi.effects import Payload
@@ -86,6 +87,7 @@ class Grasped:
         object.__setattr__(self, "shape", tuple(shapes))
         if not self.name:
             raise InputError("a grasped object needs a name.")
+        require_name(self.name, "a grasped object")
         mass = numbers_of("mass", self.mass)
         if mass.shape or not 0.0 < mass <= MAX_MASS:
             raise InputError(

@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
+from hovi.checks.names import require_name
 from hovi.checks.shapes import numbers_of
 from hovi.errors import InputError, nearest
 from hovi.planning.obstacles.obstacle_path import ObstaclePath
@@ -22,6 +23,8 @@ Array = npt.NDArray[np.float64]
 
 MAX_NUMBER = 1e9
 """Largest number of an obstacle, in [m] or [rad]."""
+MIN_LENGTH = 1e-9
+"""Smallest length of an obstacle, in [m]: volumes and inertias of smaller ones vanish."""
 GRASPED_KEYS = {
     "frame": "the name of a link of the robot",
     "mass": "a positive number of kilograms",
@@ -62,6 +65,7 @@ class Obstacle(ABC):
     path: ObstaclePath | Mapping[str, Any] | None = field(default=None, kw_only=True)
 
     def __post_init__(self) -> None:
+        require_name(self.name, f"a {self.in_words}")
         object.__setattr__(self, "path", ObstaclePath.of(self.path))
 
     @abstractmethod
@@ -124,9 +128,11 @@ class Obstacle(ABC):
     def _keep_lengths(self, key: str, shape: tuple[int, ...]) -> None:
         """As _keep, for positive lengths."""
         self._keep(key, shape)
-        if np.min(getattr(self, key)) <= 0:
+        least = np.min(getattr(self, key))
+        if least < MIN_LENGTH:
+            much = "positive" if least <= 0.0 else f"at least {MIN_LENGTH:g}"
             raise InputError(
-                f"`{key}` of a {self.in_words} must be positive, in metres, got "
+                f"`{key}` of a {self.in_words} must be {much}, in metres, got "
                 f"{getattr(self, key)!r}."
             )
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from hovi.checks.arguments import check_arguments_except
 from hovi.checks.kinds import is_number, shown
+from hovi.checks.names import require_name
 from hovi.checks.shapes import numbers_of
 from hovi.checks.tables import entries_of
 from hovi.discrete.state import State
@@ -57,6 +58,7 @@ class Segment:
     name: str = ""
 
     def __post_init__(self) -> None:
+        require_name(self.name, "a segment")
         T = seconds(self.duration, "the duration of a segment")
         if not (math.isfinite(T) and T > 0):
             raise InputError(f"the duration of a segment must be positive, got {T} s.")

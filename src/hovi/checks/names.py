@@ -1,0 +1,20 @@
+"""Names that callers give to things of theirs."""
+
+from __future__ import annotations
+
+from hovi.errors import InputError
+
+MAX_LENGTH = 1_000
+"""Largest number of characters of a name."""
+
+
+def require_name(name: str, what: str) -> None:
+    """Raise InputError for a name with a NUL or another control character, and for a long one.
+
+    Such a name would be cut off or lost in files and messages. what: the thing, for the message.
+    """
+    if not name.isprintable() or len(name) > MAX_LENGTH:
+        raise InputError(
+            f"the name of {what} must be printable characters, at most {MAX_LENGTH:,}, got "
+            f"{name[:80]!r}."
+        )
