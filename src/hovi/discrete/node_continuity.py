@@ -19,7 +19,7 @@ TOLERANCE = 1e-6
 """Relative to the largest coordinate; an unmodified motion deviates by rounding only."""
 
 
-def require_moderate(path: DiscretePath) -> None:
+def _require_moderate(path: DiscretePath) -> None:
     """Raise InputError for numbers beyond any motion, of which samples would not be finite."""
     for name in ("q", "v", "z", "inner", "higher"):
         most = np.abs(getattr(path, name)).max(initial=0.0)
@@ -37,8 +37,9 @@ def require_continuous(
     q1^(j) = sum_{i >= j} h^(i-j) q0^(i) / (i-j)! + h^(k-j) z_j, j < k.
 
     space: the configuration space; None if it is a vector space.
-    The message names the interval.
+    And numbers must not be larger than MAX_NUMBER. The message names the interval.
     """
+    _require_moderate(path)
     if path.order != 2:
         _require_ends(path, grid, space)
         return

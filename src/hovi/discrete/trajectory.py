@@ -18,7 +18,7 @@ from hovi.checks.arguments import check_arguments
 from hovi.checks.shapes import numbers_of, require_shape
 from hovi.discrete.grid import DiscretePath, Grid
 from hovi.discrete.interval_paths import scaled_data
-from hovi.discrete.node_continuity import require_continuous, require_moderate
+from hovi.discrete.node_continuity import require_continuous
 from hovi.discrete.output.export_methods import ExportMethods
 from hovi.discrete.output.interpolant import interpolant_rows
 from hovi.discrete.output.path_sampler import PathSampler
@@ -331,7 +331,6 @@ class Trajectory(ExportMethods, TrajectorySummary):
                 torque=StoredTorque(arrays[_TORQUE]) if stored else None,
                 segments=segments,
             )
-            require_moderate(loaded.path)
             require_continuous(loaded.path, loaded.grid, loaded.space)
             require_unchanged(header, arrays)
             return loaded
