@@ -9,12 +9,15 @@ import difflib
 import re
 import sys
 import warnings
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from typing import Any
 
 _MAX_COMPARED = 256  # characters of a name; the time of a comparison grows with their square
 _MAX_LISTED = 60  # names in a message
 _BETWEEN = ("contextlib", "functools")  # modules that call hovi for hovi
+_RECORDED: ContextVar[tuple[list[str], ...]] = ContextVar("_RECORDED", default=())
 _LONG_RUN = re.compile(r"\S{160,}|\s{160,}")
 _FIRST, _LAST = 1_000, 400  # characters of a long message that are kept
 
@@ -84,10 +87,23 @@ class HoviWarning(UserWarning):
 
 def warn(sentence: str, category: type[Warning] = HoviWarning) -> None:
     """Warn of something at the line that called hovi, however deep the call is in hovi."""
+    for each in _RECORDED.get() if category is HoviWarning else ():
+        each.append(sentence)
     frame, level = sys._getframe(1), 2
     while frame.f_back is not None and _is_own(frame.f_globals.get("__name__")):
         frame, level = frame.f_back, level + 1
     warnings.warn(sentence, category, stacklevel=level)
+
+
+@contextmanager
+def recorded_warnings() -> Iterator[list[str]]:
+    """The sentences that hovi warns of in the block, whatever the filters of warnings show."""
+    sentences: list[str] = []
+    token = _RECORDED.set((*_RECORDED.get(), sentences))
+    try:
+        yield sentences
+    finally:
+        _RECORDED.reset(token)
 
 
 def _is_own(module: object) -> bool:

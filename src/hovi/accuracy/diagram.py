@@ -25,7 +25,8 @@ class Diagram(Summarized):
     limited: whether all motions hold limits.
     notes: sentences on the motion and on what was left out. complete: False if the time budget ran
         out.
-    seconds: duration of the measurement. clock: "wall" or "processor", used to time solves.
+    seconds: duration of the measurement, by the wall. clock: "processor" or "wall", of all times
+        of solves.
     """
 
     scene: str
@@ -38,7 +39,7 @@ class Diagram(Summarized):
     notes: tuple[str, ...] = ()
     complete: bool = True
     seconds: float = 0.0
-    clock: str = "wall"
+    clock: str = "processor"
 
     def _summary(self) -> Summary:
         counts = {method: len(self.of(method)) for method in self.methods}

@@ -94,8 +94,8 @@ def measure(
 class _Refinement:
     """A method on finer and finer grids.
 
-    solved: its runs so far. spent: time of their solves. expected: time of the next run, set-up
-    included. Both in [s].
+    solved: its runs so far. spent: time of their solves. expected: wall time of the next run,
+    set-up included. Both in [s].
     """
 
     method: Method
@@ -110,7 +110,7 @@ class _Refinement:
 
     def run_next(self, reference: ReferenceMotion) -> Run:
         """The first run on the next finer grid. Raises UnmeasurableError."""
-        watch = Stopwatch()
+        watch = Stopwatch("wall")
         intervals = next(each for each in INTERVALS if each > self._done)
         prepared = self.method.prepare(intervals)
         run = _first_run(self.method, intervals, prepared, reference)

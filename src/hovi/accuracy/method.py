@@ -82,7 +82,7 @@ class Stopwatch:
     clock: in CLOCKS.
     """
 
-    def __init__(self, clock: str = "wall") -> None:
+    def __init__(self, clock: str = "processor") -> None:
         self._now = CLOCKS[clock]
         self._began = self._now()
 

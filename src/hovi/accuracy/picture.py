@@ -61,9 +61,9 @@ def work_precision_figure(diagram: Diagram, fastest: bool = False) -> Figure:
         _choices(ax, diagram, measure, fastest)
         _default(ax, diagram, measure, fastest)
         _least_errors(ax, diagram, measure)
-        ax.set_xlabel("warm solve [ms]")
+        ax.set_xlabel(f"warm solve [ms of {diagram.clock} time]")
     _panel(panels[1, 1], diagram, "cost", _cold)
-    panels[1, 1].set_xlabel("setup and first solve [ms]")
+    panels[1, 1].set_xlabel(f"setup and first solve [ms of {diagram.clock} time]")
     for ax in panels.flat:
         if not np.isfinite(ax.dataLim.minpos).all():  # nothing to show, and no range of a log axis
             ax.set(xlim=(1.0, 10.0), ylim=(1e-3, 1.0))
@@ -87,9 +87,8 @@ def _cold(run: Run) -> float:
 
 def _title(diagram: Diagram) -> str:
     start = {"near": "a guess near the motion", "cubic": "the cubic guess"}[diagram.guess]
-    clock = "" if diagram.clock == "wall" else ", in processor time"
     limits = "within limits, " if diagram.limited else ""
-    title = f"{diagram.scene}: error against time, {limits}from {start}{clock}"
+    title = f"{diagram.scene}: error against time, {limits}from {start}"
     if diagram.default is None or diagram.default.counts:
         return title
     return f"{title}\nplan's default found {diagram.default.found}, and has no star"

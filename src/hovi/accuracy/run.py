@@ -20,7 +20,8 @@ class Run:
     method, family, order: see Method. intervals: of the final grid.
     success, message, cost: as reported by the method. steps: iterations.
     error: against the resolved motion.
-    setup_seconds: setup. first_seconds: first solve. repeats: each later solve. All in [s].
+    setup_seconds: setup. first_seconds: first solve. repeats: each later solve. All in
+        [s], by the clock of the diagram.
     """
 
     method: str

@@ -68,8 +68,8 @@ def _cells(run: Run) -> tuple[str, ...]:
 
 
 def as_csv(diagram: Diagram) -> str:
-    """One line per run below a header, with times in [s]."""
-    rows = [run.to_dict() for run in diagram.runs]
+    """One line per run below a header, with times in [s] by the clock of the last column."""
+    rows = [run.to_dict() | {"clock": diagram.clock} for run in diagram.runs]
     stream = io.StringIO()
     writer = csv.DictWriter(stream, [name for name in rows[0] if name != "repeats"])
     writer.writeheader()

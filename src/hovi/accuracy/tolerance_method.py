@@ -103,7 +103,7 @@ class ChoiceTimer:
     reference: ReferenceMotion
     budget: Budget
     repeats: int
-    clock: str = "wall"
+    clock: str = "processor"
 
     @property
     def left(self) -> float:

@@ -59,7 +59,7 @@ class VariationalMethod(Method):
         problem: TrajectoryProblem,
         guess: Curve,
         scheme: str,
-        clock: str = "wall",
+        clock: str = "processor",
         longest: float | None = None,
     ) -> None:
         self._problem, self._guess, self._clock = problem, guess, clock

@@ -58,7 +58,7 @@ class Setting:
     guess: Curve
     nearer: Curve
     longest: float = 60.0
-    clock: str = "wall"
+    clock: str = "processor"
 
 
 Peer = Callable[[Setting], Method]
@@ -75,7 +75,7 @@ def work_precision(
     peers: Sequence[Peer] = (),
     budget: float = 60.0,
     repeats: int = REPEATS,
-    clock: str = "wall",
+    clock: str = "processor",
     enough: Thresholds = SUFFICIENT_ERRORS,
     progress: Progress | None = None,
 ) -> Diagram:
@@ -90,7 +90,8 @@ def work_precision(
     schemes: names for `by_name`; SCHEMES, or LIMITED_SCHEMES within limits, if None.
     peers: reference tools for comparison.
     budget: wall time, in [s]. repeats: timed solves of every run after the first.
-    clock: "wall", or "processor" for a machine under other load.
+    clock: "processor", of this process, its workers and its peers each by its own clock, or "wall",
+        which other load makes longer.
     enough: errors below which no finer grid is tried; within limits, and for a motion that is not
         resolved so far, larger ones are enough.
     progress: called with a line of text and the fraction of the budget spent.

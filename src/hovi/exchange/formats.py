@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from hovi.checks.arguments import check_arguments_except
-from hovi.discrete.output.caution import warn_of_caution
+from hovi.discrete.output.caution import warn_of_cautions
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError, expect, nearest
 from hovi.system.dataclass import dataclass
@@ -43,7 +43,7 @@ class ExportFormat:
         Raises InputError for an invalid rate and for a motion that the format cannot hold,
         DisplayError when the file cannot be written or an optional library is missing.
         """
-        warn_of_caution(trajectory.metadata)
+        warn_of_cautions(trajectory.metadata)
         module, name = self.writer.split(":")
         write = getattr(importlib.import_module(module), name)
         write(trajectory, path, self.rate if rate is None else rate, **options)

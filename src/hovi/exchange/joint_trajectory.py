@@ -11,6 +11,7 @@ import os
 from pathlib import Path
 from typing import Any
 
+from hovi.discrete.output.caution import caution_lines
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError
 from hovi.exchange.joint_motion import joint_motion
@@ -70,11 +71,13 @@ def write_joint_trajectory(
 ) -> None:
     """Write the message as JSON if the name ends in .json, as YAML otherwise.
 
+    The YAML begins with the motion's cautions, as comments; a message has no place for them.
     Arguments and errors as in `joint_trajectory`; DisplayError when the file cannot be written.
     """
     message = joint_trajectory(trajectory, rate, efforts=efforts)
     as_json = Path(path).suffix.lower() == ".json"
-    text = json.dumps(message, indent=1) + "\n" if as_json else _yaml(message)
+    lines = (f"# {each}\n" for each in caution_lines([trajectory.metadata]))
+    text = json.dumps(message, indent=1) + "\n" if as_json else "".join(lines) + _yaml(message)
     with whole_export(path, "message") as stream:
         stream.write(text.encode())
 

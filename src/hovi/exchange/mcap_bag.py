@@ -5,12 +5,14 @@ Foxglove shows it: the robot from /robot_description and /tf, curves from /joint
 
 from __future__ import annotations
 
+import json
 import os
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from hovi.discrete.output.caution import caution_lines
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError
 from hovi.exchange import ros_messages
@@ -51,7 +53,7 @@ def write_mcap(trajectory: Trajectory, path: str | os.PathLike[str], rate: float
 
     Joint states include joints that mimic others, with an effort of 0, which their leader bears,
     and locked joints, whose effort is not known (NaN). A base is a transform from "world". The
-    motion begins at 1 s.
+    motion begins at 1 s. The metadata "hovi" have its cautions, as JSON.
     rate: messages per second.
     Raises InputError for an invalid rate and a motion without its robot, DisplayError when the file
     cannot be written or a library is missing.
@@ -66,6 +68,8 @@ def write_mcap(trajectory: Trajectory, path: str | os.PathLike[str], rate: float
     with whole_export(path, "MCAP file") as stream:
         writer = writer_of.Writer(stream)
         writer.start(profile="ros2", library="hovi")
+        cautions = json.dumps(caution_lines([trajectory.metadata]))
+        writer.add_metadata("hovi", {"cautions": cautions})
         _write(_Topics(writer), motion, robot, trajectory.configurations(motion.times))
         writer.finish()
 

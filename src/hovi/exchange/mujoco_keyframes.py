@@ -6,10 +6,12 @@
 from __future__ import annotations
 
 import os
+import re
 from xml.etree import ElementTree
 
 import numpy as np
 
+from hovi.discrete.output.caution import caution_lines
 from hovi.discrete.trajectory import Trajectory
 from hovi.exchange.mujoco_model import angles, controls, left_out, mjcf, mujoco_scene
 from hovi.exchange.samples import times_of
@@ -20,8 +22,8 @@ def write_mujoco(trajectory: Trajectory, path: str | os.PathLike[str], rate: flo
     """Write one MJCF file. MuJoCo is not needed for it.
 
     Controls are the torques of the planned motion that belong to this model: rigid bodies, armature
-    and viscous friction; a comment names the effects that it does not have. Passive joints have no
-    motor. The robot is drawn by bars, without its meshes.
+    and viscous friction; comments name the effects that it does not have, and have the motion's
+    cautions. Passive joints have no motor. The robot is drawn by bars, without its meshes.
     rate: keyframes per second.
     Raises InputError for an invalid rate and for a motion that a MuJoCo model cannot hold,
     DisplayError when the file cannot be written.
@@ -38,6 +40,8 @@ def write_mujoco(trajectory: Trajectory, path: str | os.PathLike[str], rate: flo
         )  # fmt: skip
     missing = ", ".join(left_out(scene)) or "none"
     root.insert(0, ElementTree.Comment(f" effects that are not in this model: {missing} "))
+    for each in caution_lines([trajectory.metadata]):
+        root.insert(0, ElementTree.Comment(f" {re.sub('-+', '-', each)} "))
     ElementTree.indent(root)
     with whole_export(path, "MuJoCo model") as stream:
         stream.write(ElementTree.tostring(root) + b"\n")

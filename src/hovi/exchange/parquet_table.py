@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import os
 
+from hovi.discrete.output.caution import caution_lines
 from hovi.discrete.trajectory import Trajectory
 from hovi.exchange.libraries import library
 from hovi.exchange.samples import times_of
@@ -14,7 +16,7 @@ from hovi.viewing.csv_table import column_names
 def write_parquet(trajectory: Trajectory, path: str | os.PathLike[str], rate: float) -> None:
     """Write one row per sample with the columns of the CSV table, as doubles.
 
-    The metadata of the schema has the units and the motion's duration.
+    The metadata of the schema has the units, the motion's duration and its cautions, as JSON.
     rate: samples per second.
     Raises InputError for an invalid rate, DisplayError when the file cannot be written or pyarrow
     is missing.
@@ -23,7 +25,11 @@ def write_parquet(trajectory: Trajectory, path: str | os.PathLike[str], rate: fl
     pyarrow = library("pyarrow", "pyarrow", "the format 'parquet'")
     parquet = library("pyarrow.parquet", "pyarrow", "the format 'parquet'")
     columns = [times, *(column for x in trajectory.sample(times) for column in x.T)]
-    metadata = {"units": "SI, radians", "duration": repr(trajectory.duration)}
+    metadata = {
+        "units": "SI, radians",
+        "duration": repr(trajectory.duration),
+        "cautions": json.dumps(caution_lines([trajectory.metadata])),
+    }
     names = column_names(trajectory)[: len(columns)]
     table = pyarrow.table(columns, names=names).replace_schema_metadata(metadata)
     with whole_export(path, "table") as stream:

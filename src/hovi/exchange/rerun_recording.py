@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from hovi.discrete.output.caution import caution_lines
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError
 from hovi.exchange.joint_motion import joint_motion
@@ -27,6 +28,7 @@ def write_rerun(trajectory: Trajectory, path: str | os.PathLike[str], rate: floa
 
     Poses of the links in the world are under /robot/LINK, bars between them at /robot/bars. Times
     are on the timeline "motion", in nanoseconds; a motion without its robot has the curves alone.
+    Its cautions are a text under /cautions.
     rate: samples per second.
     Raises InputError for an invalid rate, DisplayError when the file cannot be written or rerun-sdk
     is missing.
@@ -46,6 +48,9 @@ def write_rerun(trajectory: Trajectory, path: str | os.PathLike[str], rate: floa
             for name, column in zip(motion.names, values.T, strict=False):
                 curve = rerun.Scalars.columns(scalars=column)
                 stream.send_columns(f"joints/{name}/{kind}", indexes=[times], columns=curve)
+        cautions = caution_lines([trajectory.metadata])
+        if cautions:
+            stream.log("cautions", rerun.TextDocument("\n".join(cautions)), static=True)
         if trajectory.robot is not None:
             q = trajectory.configurations(motion.times)
             _draw(rerun, stream, trajectory.robot, q, times)

@@ -1,13 +1,16 @@
-"""Writing figures reproducibly and atomically, and aligning the zeros of two axes."""
+"""Writing figures reproducibly and atomically, cautions under them, and zeros of two axes."""
 
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from textwrap import fill
+from typing import TYPE_CHECKING, Any
 
 from matplotlib.figure import Figure
 
+from hovi.discrete.output.caution import caution_lines
 from hovi.errors import DisplayError
 from hovi.system.files import reason, whole_file
 
@@ -16,6 +19,7 @@ if TYPE_CHECKING:
 
 
 _DPI = 150
+_COLUMNS_PER_INCH = 16.5  # of text of the size of cautions
 _METADATA: dict[str, dict[str, str | None]] = {
     ".png": {"Software": None},
     ".pdf": {"CreationDate": None},
@@ -36,6 +40,15 @@ def write_figure(figure: Figure, path: str | os.PathLike[str]) -> None:
             figure.savefig(stream, format=suffix[1:], dpi=_DPI, metadata=_METADATA[suffix])
     except OSError as error:
         raise DisplayError(f"cannot write the picture {str(path)!r}: {reason(error)}.") from error
+
+
+def draw_cautions(figure: Figure, motions: Sequence[Mapping[str, Any]]) -> None:
+    """Write the cautions of motions, by their metadata, under a figure of constrained layout."""
+    columns = int(_COLUMNS_PER_INCH * figure.get_figwidth())
+    lines = [fill(each, columns, subsequent_indent="  ") for each in caution_lines(motions)]
+    if lines:
+        text = "\n".join(lines).replace("$", r"\$")  # no formula
+        figure.supxlabel(text, x=0.01, ha="left", fontsize=7.0, color="#a33c00")
 
 
 def align_zeros(one: Axes, other: Axes) -> None:

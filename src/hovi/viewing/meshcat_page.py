@@ -118,12 +118,14 @@ class Page:
 
     title: of the browser's window, and a line in the page's corner.
     note: a second line there, such as a sentence about meshes that were not found.
+    cautions: lines there, of the motions, that films show too.
     panel: what is shown beside the scene; empty at first.
     """
 
     def __init__(self, title: str, note: str = "") -> None:
         """An empty page."""
         self.title, self.note = title, note
+        self.cautions: list[str] = []
         self.panel = Panel()
         self.web_url = ""
         self.messages = Messages()
@@ -165,6 +167,7 @@ class Page:
             "policy": policy,
             "title": html.escape(self.title),
             "note": html.escape(self.note),
+            "cautions": html.escape("\n".join(self.cautions)),
             "style": _part("page.css"),
             "meshcat": meshcat,
             "panel": self.panel.to_json(),

@@ -37,7 +37,7 @@ from hovi.viewing.curves.scheme_torque import scheme_torque
 from hovi.viewing.curves.shown_figure import ShownFigure
 from hovi.viewing.curves.unwrapped_angles import shown_names, unwrapped
 from hovi.viewing.distance_panel import draw_distances
-from hovi.viewing.figures import align_zeros, write_figure
+from hovi.viewing.figures import align_zeros, draw_cautions, write_figure
 from hovi.viewing.limit_bands import Curve, draw_limits, legend_entries
 from hovi.viewing.recorded_limits import imposed_limits, kept_distances
 from hovi.viewing.segment_marks import draw_segments
@@ -45,7 +45,6 @@ from hovi.viewing.segment_marks import draw_segments
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
 
-"""The color-blind safe palette of Okabe and Ito."""
 _LINE_STYLES = ("-", "--", ":", "-.")
 _CURVE_POINTS = 2_000
 _MAX_MARKED_INTERVALS = 150
@@ -99,6 +98,7 @@ def plot(
     else:
         labels = [f"{k + 1}: {each.duration:g} s" for k, each in enumerate(motions)]
         figure = joint_figure(motions, labels, [imposed_limits(each) for each in motions])
+    draw_cautions(figure, [each.metadata for each in motions])
     if path is not None:
         write_figure(figure, path)
     return figure

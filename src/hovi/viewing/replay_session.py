@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Self
 
 from hovi.checks.arguments import check_arguments_except
-from hovi.discrete.output.caution import caution_of, warn_of_caution
+from hovi.discrete.output.caution import caution_lines, warn_of_cautions
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import DisplayError, InputError, expect
 from hovi.planning.problem.limits import as_limits
@@ -254,10 +254,11 @@ def _fill(
 ) -> Replay:
     """Draw motions on a page, with all that is shown beside them."""
     robot = _robot(trajectory)
-    warn_of_caution(trajectory.metadata)
+    warn_of_cautions(trajectory.metadata)
     others = [(each, _robot(each)) for each in compare]
     highlights = Highlights.of(trajectory, robot, frame_times(trajectory))
-    page.title, page.note = _title(trajectory, robot), _note(trajectory, robot, highlights)
+    page.title, page.note = _title(trajectory, robot), _note(robot, highlights)
+    page.cautions = caution_lines([each.metadata for each in (trajectory, *compare)])
     scene = drawn(trajectory, robot, page, trace, highlights, others)
     page.panel = _panel(trajectory, robot, compare, scene.view, speed, trace)
     motions = ((trajectory, scene.visualizer), *scene.ghosts)
@@ -330,10 +331,9 @@ def _open_browser(page: ServedPage) -> None:
         raise DisplayError(f"no browser showed the page in {_BROWSER_TIMEOUT:.0f} s; {advice}")
 
 
-def _note(trajectory: Trajectory, robot: Robot, highlights: Highlights | None) -> str:
+def _note(robot: Robot, highlights: Highlights | None) -> str:
     at_limit = "" if highlights is None else AT_LIMIT_NOTE
-    notes = [caution_of(trajectory.metadata), robot.visual_problem, at_limit]
-    return " ".join(note for note in notes if note)
+    return " ".join(note for note in (robot.visual_problem, at_limit) if note)
 
 
 def _title(trajectory: Trajectory, robot: Robot) -> str:

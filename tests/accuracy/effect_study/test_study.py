@@ -82,6 +82,25 @@ def test_an_effect_of_zero_strength_changes_nothing(study: EffectStudy) -> None:
     assert trial.tip < 1e-6
 
 
+def test_the_noise_of_the_tip_is_shown(two_link: Robot) -> None:
+    """Of a push too weak to move it, planned on other grids than the scene's own motion."""
+    scene = Scene(two_link, [Gravity(9.8)])
+    options = PlanOptions(limits="none", self_collision=False)
+    loose = Task(scene, [-1.5, 0.2], [1.5, 0.4], 1.0, options)
+    study = study_effects(loose, [Wrench("tip", (0.0, 1e-12, 0.0))])
+    (trial,) = study.trials
+    assert trial.tip is not None
+    assert trial.tip_noise is not None
+    assert 0 < trial.tip <= 1.1 * trial.tip_noise
+    assert json.loads(study_json(study))["trials"][0]["tip_noise"] == trial.tip_noise
+    shown = dict(zip(COLUMNS, study_rows(study)[1], strict=True))["tip [mm]"]
+    value, noise = map(float, shown.split(" ± "))
+    assert value == pytest.approx(1e3 * trial.tip, rel=1e-2)
+    assert 1e3 * trial.tip_noise <= noise <= 2e3 * trial.tip_noise
+    unknown = dataclasses.replace(study, trials=(dataclasses.replace(trial, tip_noise=None),))
+    assert "± ?" in study_rows(unknown)[1][4]
+
+
 def test_a_cost_term_changes_the_plan_but_not_the_simulation(study: EffectStudy) -> None:
     trial = study.trials[2]
     assert (trial.torque, trial.open_loop, trial.held) == (0.0, 0.0, 0.0)

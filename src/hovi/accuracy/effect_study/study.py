@@ -14,6 +14,7 @@ from hovi.discrete.trajectory import Trajectory
 from hovi.effects import Effect, Touch
 from hovi.errors import HoviError, InputError, SceneError
 from hovi.flows.execution.tracking import play
+from hovi.planning.refinement.error_estimate import estimate_error
 from hovi.planning.solver.solver import Solution
 from hovi.planning.task_file.task import Task
 from hovi.planning.task_file.task_plan import plan_task
@@ -21,7 +22,7 @@ from hovi.robot.frame_distance import FrameDistance
 from hovi.scene.evaluation_cost import seconds_per_point
 from hovi.scene.scene import Scene
 from hovi.system.dataclass import dataclass
-from hovi.system.deadline import Deadline
+from hovi.system.deadline import Deadline, OutOfTimeError
 from hovi.system.interruption import interruptible, raise_if_interrupted, record_interrupt
 from hovi.system.progress import Progress, shows_progress, silent
 
@@ -44,7 +45,8 @@ class EffectTrial:
         success: whether that is a minimum; if not, the cost has no meaning.
         nit, plan_seconds: iterations and time of planning.
     tip: largest distance of the robot's tip_frames from the scene's own motion, in [m]; None if the
-        durations differ or no minimum was found.
+        durations differ or no minimum was found. tip_noise: how much of it may come from the grids:
+        the estimated errors of both motions at the tip, in [m]; None if they are unknown.
     open_loop, held: tip deviation at the end, the largest of the tip_frames, when the planned
         torques are applied in the changed scene, without and with a feedback of 10 rad/s, in [m];
         None if the simulation diverged.
@@ -60,6 +62,7 @@ class EffectTrial:
     nit: int
     plan_seconds: float
     tip: float | None
+    tip_noise: float | None
     open_loop: float | None
     held: float | None
     instructions: int
@@ -146,6 +149,7 @@ def study_effects(
     _plan(task, task.scene, solution.trajectory, 1)
     replan_seconds = time.perf_counter() - began
     scenes = [_with_or_without(scene, effect) for effect in tried]
+    own_error = _tip_error(solution, default_limit)
     own_seconds, *times = seconds_per_point([scene, *scenes])
     trials, failed = list[EffectTrial](), list[FailedTrial]()
     try:
@@ -156,7 +160,7 @@ def study_effects(
             if limit <= 0:
                 break
             try:
-                trials.append(_trial(task, solution.trajectory, effect, changed, seconds, limit))
+                trials.append(_trial(task, solution, own_error, effect, changed, seconds, limit))
             except Exception as error:  # an effect may be a user's own
                 failed.append(FailedTrial(effect, _sentence(error)))
     except KeyboardInterrupt:
@@ -180,14 +184,27 @@ def _with_or_without(scene: Scene, effect: Effect) -> Scene:
 
 
 def _trial(
-    task: Task, own: Trajectory, effect: Effect, scene: Scene, seconds: float, limit: float
+    task: Task,
+    unchanged: Solution,
+    own_error: float | None,
+    effect: Effect,
+    scene: Scene,
+    seconds: float,
+    limit: float,
 ) -> EffectTrial:
-    """The trial of an effect; limit: of planning, in [s]. Raises KeyboardInterrupt."""
+    """The trial of an effect; limit: of planning, in [s]. Raises KeyboardInterrupt.
+
+    own_error: of the tip of the unchanged motion, in [m].
+    """
+    own = unchanged.trajectory
     named = {each.key: each for each in task.scene.effects}
     began = time.perf_counter()
     found = _plan(task, scene, own, 1, limit)
     took = time.perf_counter() - began
     moves = set(effect.touches) != {Touch.COST}
+    tip = _tip_distance(own, found.trajectory) if found.success else None
+    error = None if tip is None or own_error is None else _tip_error(found, limit)
+    noise = None if error is None or own_error is None else own_error + error
     return EffectTrial(
         named.get(effect.key, effect),
         effect.key not in named,
@@ -196,7 +213,8 @@ def _trial(
         found.success,
         found.nit,
         took,
-        _tip_distance(own, found.trajectory) if found.success else None,
+        tip,
+        noise,
         _tip_deviation(scene, own, "none") if moves else 0.0,
         _tip_deviation(scene, own, "pd") if moves else 0.0,
         scene.graph().n_instructions() - task.scene.graph().n_instructions(),
@@ -230,6 +248,22 @@ def _tip_distance(own: Trajectory, other: Trajectory) -> float | None:
     t = np.minimum(t, other.duration)
     distance = FrameDistance.between(robot, own.configurations(t), other.configurations(t))
     return float(distance.largest.max())
+
+
+def _tip_error(solution: Solution, limit: float) -> float | None:
+    """The estimated error of a minimum at the tip_frames, in [m]; None if there is no estimate.
+
+    limit: of a solve on a finer grid, if one is needed, in [s].
+    """
+    accuracy = solution.accuracy
+    if accuracy is not None and accuracy.estimate is not None and accuracy.tolerance.frame is None:
+        return accuracy.estimate.largest_tip
+    try:
+        with Deadline(limit).in_force():
+            found = estimate_error(solution)
+    except (HoviError, OutOfTimeError):
+        return None
+    return None if found is None else found.largest_tip
 
 
 def _tip_deviation(scene: Scene, own: Trajectory, feedback: str) -> float | None:

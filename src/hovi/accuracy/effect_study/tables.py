@@ -36,8 +36,9 @@ def study_note(study: EffectStudy) -> str:
     tips = names_in_words(study.task.scene.robot.tip_frames)
     return (
         "torque: largest change along the scene's own motion; cost, change, tip: the motion "
-        "planned with the effect; open loop, held: tip deviation at the end when the planned "
-        "torques are applied with the effect, without and with a feedback of 10 rad/s; the tip is "
+        "planned with the effect, the tip plus or minus the estimated errors of this motion and of "
+        "the scene's own; open loop, held: tip deviation at the end when the planned torques are "
+        "applied with the effect, without and with a feedback of 10 rad/s; the tip is "
         f"{tips}; us/point: one evaluation with derivatives; ratio: us/point relative to the "
         "unchanged scene."
     )
@@ -56,7 +57,7 @@ def _row(study: EffectStudy, trial: EffectTrial) -> list[str]:
         f"{trial.torque:.3g}",
         f"{trial.cost:.6g}" if trial.success else "no minimum",
         f"{100 * study.change(trial):+.3g} %" if trial.success else "-",
-        "-" if trial.tip is None else _millimetres(trial.tip),
+        _with_noise(trial),
         _millimetres(trial.open_loop),
         _millimetres(trial.held),
         f"{trial.instructions:+d}",
@@ -64,6 +65,23 @@ def _row(study: EffectStudy, trial: EffectTrial) -> list[str]:
         f"{trial.seconds / study.seconds:.3g}",
         f"{trial.plan_seconds:.2g}",
     ]
+
+
+def _with_noise(trial: EffectTrial) -> str:
+    """The distance of the tip, plus or minus what the grids contribute, rounded up to a digit."""
+    if trial.tip is None:
+        return "-"
+    if trial.tip_noise is None:
+        return f"{_millimetres(trial.tip)} ± ?"
+    return f"{_millimetres(trial.tip)} ± {_rounded_up(1e3 * trial.tip_noise)}"
+
+
+def _rounded_up(number: float) -> str:
+    """With one significant digit."""
+    if number == 0.0:
+        return "0"
+    unit = 10.0 ** math.floor(math.log10(number))
+    return f"{float(f'{unit * math.ceil(number / unit):.1g}'):g}"
 
 
 def _millimetres(distance: float | None) -> str:
@@ -85,6 +103,7 @@ def study_json(study: EffectStudy) -> str:
             "success": trial.success,
             "nit": trial.nit,
             "tip": trial.tip,
+            "tip_noise": trial.tip_noise,
             "open_loop": trial.open_loop,
             "held": trial.held,
             "instructions": trial.instructions,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -48,6 +49,23 @@ def beside(file: Path, suffix: str) -> Path:
         given = str(file) if file.parts else ""
         raise InputError(f"FILE must be a motion, such as motion.npz, and not {given!r}.")
     return file.with_suffix(suffix)
+
+
+def load_shown(path: Path, warned: bool = True) -> Trajectory:
+    """The same, after its cautions on stderr.
+
+    warned: whether hovi warns of those against executing the motion when it is shown.
+    """
+    import sys
+
+    from hovi.discrete.output.caution import cautions_of
+
+    motion = load_trajectory(path)
+    for each in cautions_of(motion.metadata):
+        if not (warned and each.is_against):
+            with suppress(OSError):  # stderr may be closed
+                print(f"caution: {each}", file=sys.stderr, flush=True)
+    return motion
 
 
 def load_trajectory(path: Path) -> Trajectory:

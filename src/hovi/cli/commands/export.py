@@ -35,13 +35,13 @@ def export(
 
     Formats: csv, numpy, parquet, joint-trajectory, mcap, mujoco, rerun, video, gif.
     """
-    from hovi.cli.arguments.files import check_output, load_trajectory
+    from hovi.cli.arguments.files import check_output, load_shown
 
     given = _output(positional, out)
     chosen = _format(format_, csv, given)
     target = check_output(given or _beside(file, chosen.suffix), *chosen.suffixes)
     _require_other_file(target, file)
-    chosen.write(load_trajectory(file), target, rate)
+    chosen.write(load_shown(file), target, rate)
     print(f"wrote {target}")
 
 

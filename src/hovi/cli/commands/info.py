@@ -12,9 +12,9 @@ def info(
     what: Annotated[
         str | None,
         typer.Argument(
-            metavar="ROBOT|SCENE.toml",
-            help="A .urdf, a name of example-robot-data, a scene file or a shipped scene's name; "
-            "without it, all names are listed.",
+            metavar="ROBOT|SCENE.toml|FILE.npz",
+            help="A .urdf, a name of example-robot-data, a scene file, a shipped scene's name or a "
+            "motion; without it, all names are listed.",
         ),
     ] = None,
     mimic: Annotated[
@@ -24,7 +24,7 @@ def info(
         bool, typer.Option("--free-flyer", help="Give the robot a floating base.")
     ] = False,
 ) -> None:
-    """Describe a robot, or a scene and the effects that it leaves out."""
+    """Describe a robot, a scene and the effects that it leaves out, or a motion."""
     from hovi.errors import InputError, nearest
     from hovi.robot.bundled_models import example_scenes
     from hovi.robot.example_robots import example_names
@@ -37,12 +37,14 @@ def info(
         print(_listed("scenes that ship with hovi", scenes))
     elif what.lower().endswith(".toml") or what in scenes:
         print(_scene(what))
+    elif what.lower().endswith(".npz"):
+        print(_motion(what))
     elif is_path(what) or what in robots or format_of(what) == "description":
         print(_robot(what, mimic, free_flyer))
     else:
         raise InputError(
             f"there is no robot or scene {what!r}; {nearest(what, (*robots, *scenes))} "
-            "(A path ends in .urdf or .toml.)"
+            "(A path ends in .urdf, .toml or .npz.)"
         )
 
 
@@ -59,6 +61,17 @@ def _scene(scene: str) -> str:
     from hovi.planning.task_file.reading import load_task
 
     return describe_task(load_task(find_scene(scene)))
+
+
+def _motion(file: str) -> str:
+    from pathlib import Path
+
+    from hovi.cli.arguments.files import load_trajectory
+    from hovi.discrete.output.caution import caution_lines
+
+    motion = load_trajectory(Path(file))
+    lines = caution_lines([motion.metadata])
+    return "\n".join([repr(motion), *(f"caution: {each}" for each in lines)])
 
 
 def _robot(robot: str, mimic: bool, free_flyer: bool) -> str:

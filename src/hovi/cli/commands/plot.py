@@ -19,12 +19,12 @@ def plot(
     ] = None,
 ) -> None:
     """Plot q, v and tau of a motion; for a planar two-link arm, its swept surface as well."""
-    from hovi.cli.arguments.files import beside, check_output, load_trajectory
+    from hovi.cli.arguments.files import beside, check_output, load_shown
     from hovi.viewing.plotting import plot_all
 
     target = out or beside(file, ".png")
     if target.is_dir():
         target = target / f"{file.stem}.png"
     check_output(target, ".png", ".pdf", ".svg")
-    for picture in plot_all(load_trajectory(file), target):
+    for picture in plot_all(load_shown(file, warned=False), target):
         print(f"wrote {picture}")

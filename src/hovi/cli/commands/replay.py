@@ -28,16 +28,16 @@ def replay(
     ] = True,
 ) -> None:
     """Serve a page that plays a motion until Ctrl-C, or write the page to a file."""
-    from hovi.cli.arguments.files import check_output, load_trajectory
+    from hovi.cli.arguments.files import check_output, load_shown
 
-    others = [load_trajectory(each) for each in compare or ()]
+    others = [load_shown(each) for each in compare or ()]
     if html is None:
-        _serve(load_trajectory(file), others, speed, loop, browser)
+        _serve(load_shown(file), others, speed, loop, browser)
         return
     from hovi.viewing.replay_session import write_html
 
     check_output(html, ".html")
-    write_html(load_trajectory(file), html, compare=others, speed=speed, loop=loop)
+    write_html(load_shown(file), html, compare=others, speed=speed, loop=loop)
     print(f"wrote {html}")
 
 

@@ -16,9 +16,9 @@ def report(
     ] = None,
 ) -> None:
     """Write replay, curves, certificate, effects and scene of a motion to one offline file."""
-    from hovi.cli.arguments.files import beside, check_output, load_trajectory
+    from hovi.cli.arguments.files import beside, check_output, load_shown
     from hovi.viewing.documents.report import write_report
 
     target = check_output(html or beside(file, ".html"), ".html")
-    write_report(load_trajectory(file), target)
+    write_report(load_shown(file), target)
     print(f"wrote {target}")

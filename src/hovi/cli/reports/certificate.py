@@ -13,12 +13,6 @@ from hovi.planning.refinement.certificate import Certificate, Peak
 NOT_OPTIMALITY = "this certifies dynamics and torques, not optimality"
 
 
-COARSE_GAP = 0.01
-"""Relative difference of action and integral beyond which a grid is reported as coarse."""
-GAP_FLOOR = 1e-20
-"""Absolute difference that counts as rounding, such as for a robot at rest."""
-
-
 def certificate_json(certificate: Certificate) -> dict[str, Any]:
     """All statements, null where missing, and the reasons for missing ones."""
     errors, energy = certificate.errors, certificate.hamiltonian
@@ -42,8 +36,7 @@ def certificate_lines(certificate: Certificate, verbose: bool) -> list[tuple[str
     """Labels and their text: one line of accuracy, or all statements if `verbose`."""
     if verbose:
         return _all_lines(certificate)
-    lines = [("accuracy", f"{_errors(certificate)}; {_simulated(certificate)}")]
-    return [*lines, *_coarse(certificate)]
+    return [("accuracy", f"{_errors(certificate)}; {_simulated(certificate)}")]
 
 
 def _errors(certificate: Certificate) -> str:
@@ -66,19 +59,6 @@ def _simulated(certificate: Certificate) -> str:
     return f"simulating the torques from node to node agrees to {' and '.join(parts)}"
 
 
-def _coarse(certificate: Certificate) -> list[tuple[str, str]]:
-    """A caution about a grid that is too coarse for its scheme."""
-    if _gap(certificate) <= COARSE_GAP:
-        return []
-    return [
-        (
-            "! coarse",
-            f"the cost of the curve, {certificate.integral:.6g}, differs by more than 1 %: plan to "
-            "a tolerance, or use more intervals",
-        )
-    ]
-
-
 def _all_lines(certificate: Certificate) -> list[tuple[str, str]]:
     energy, missing = certificate.hamiltonian, certificate.missing
     lines = [
@@ -91,7 +71,6 @@ def _all_lines(certificate: Certificate) -> list[tuple[str, str]]:
     ]
     if certificate.bound is not None:
         lines.append(("bound", f"this minimum costs at most {certificate.bound:.10g}"))
-    lines += _coarse(certificate)
     if energy is not None:
         lines.append(("energy", f"Pontryagin's H = {energy.mean:.6g}, spread {energy.spread:.1e}"))
     if certificate.residual is not None:
@@ -101,12 +80,6 @@ def _all_lines(certificate: Certificate) -> list[tuple[str, str]]:
     )
     lines.append(("replay", _text_or_reason(certificate.replay, _replay, missing, "replay")))
     return lines
-
-
-def _gap(certificate: Certificate) -> float:
-    """The relative difference between the integral along the curve and the discrete action."""
-    gap = abs(certificate.integral - certificate.action)
-    return gap / max(abs(certificate.integral), GAP_FLOOR) if gap > GAP_FLOOR else 0.0
 
 
 def _text_or_reason(statement: Any, describe: Any, missing: dict[str, str], name: str) -> str:

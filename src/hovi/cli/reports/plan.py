@@ -16,6 +16,7 @@ from hovi.cli.reports.peaks import Peaks, peaks
 from hovi.cli.reports.segments import segment_lines, segments_json
 from hovi.cli.reports.terminal_table import print_table
 from hovi.discrete.measures.motion_extremes import extremes
+from hovi.discrete.output.caution import STATUS, WARNED, cautions_of
 from hovi.planning.refinement.certificate import Certificate
 from hovi.planning.solver.outcome.margins import LimitMargins
 from hovi.planning.solver.solver import Solution
@@ -38,6 +39,7 @@ def as_json(
         "success": bool(solution.success),
         "status": str(solution.status),
         "message": solution.message,
+        "cautions": [str(each) for each in cautions_of(trajectory.metadata)],
         "cost": solution.cost,
         "effort": solution.effort,
         "error_estimate": _estimate(solution, certificate),
@@ -91,8 +93,6 @@ def print_report(
         print(_margins_note(margins.limits))
     else:
         _print_peaks(largest)
-        if any(each.any() for each in largest.beyond().values()):
-            print("! beyond a limit of the URDF: the motion was planned without it.")
     _print_lines(extremes_lines(extremes(solution.trajectory), verbose))
     if margins.missing:
         print(f"margins  none: {margins.missing}")
@@ -104,12 +104,23 @@ def print_report(
         )
     if certificate is not None:
         _print_lines(certificate_lines(certificate, verbose))
+    _print_lines(_cautions(solution))
     _print_file(out, solution)
+
+
+def _cautions(solution: Solution) -> list[tuple[str, str]]:
+    """Labels and text of the cautions that neither the message nor a warning has said."""
+    found = cautions_of(solution.trajectory.metadata)
+    return [
+        (f"! {each.word}", each.sentence)
+        for each in found
+        if each.word not in (STATUS, WARNED) and each.sentence not in solution.message
+    ]
 
 
 def _print_lines(lines: list[tuple[str, str]]) -> None:
     for label, text in lines:
-        print(f"{label:9s}{text}")
+        print(f"{label:8s} {text}")
 
 
 def _print_file(out: Path | None, solution: Solution) -> None:

@@ -80,6 +80,8 @@ def print_summary(found: dict[str, Any], as_json: bool) -> None:
     print(f"plans    {found['plans']:,}, of which {found['success']:,} are minima")
     for status, number in found["status"].items():
         print(f"{'':9s}{number:,} {status}")
+    for word, number in found["cautions"].items():
+        print(f"caution  {number:,} minima: {word}")
     if found["irreproducible"]:
         print(f"{'':9s}{found['irreproducible']:,} may depend on a time limit")
     print(f"time     {duration_text(found['seconds'])} in all workers together")

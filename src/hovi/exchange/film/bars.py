@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from textwrap import fill
 from typing import Any
 
 import numpy as np
@@ -18,11 +19,13 @@ _COLOR = "#0072b2"
 class Bars:
     """A picture with room for all points of a motion.
 
-    points: shape (..., 3), in [m]. size: width and height, in pixels.
+    points: shape (..., 3), in [m]. size: width and height, in pixels. caption: lines at the top.
     """
 
-    def __init__(self, points: Array, size: tuple[int, int]) -> None:
+    def __init__(self, points: Array, size: tuple[int, int], caption: Sequence[str] = ()) -> None:
         figure = Figure(figsize=(size[0] / 100, size[1] / 100), dpi=100)
+        lines = [fill(each, size[0] // 6).replace("$", r"\$") for each in caption]
+        figure.text(0.01, 0.99, "\n".join(lines), va="top", fontsize=7.0, color="#a33c00")
         self._canvas: Any = FigureCanvasAgg(figure)
         self._axes: Any = figure.add_axes((0.0, 0.05, 1.0, 0.95), projection="3d")
         low, high = points.reshape(-1, 3).min(axis=0), points.reshape(-1, 3).max(axis=0)

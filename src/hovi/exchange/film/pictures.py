@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from hovi.discrete.output.caution import caution_lines
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import DisplayError, HoviWarning, InputError
 from hovi.exchange.film.headless_browser import BrowserError, Tab, headless_tab
@@ -36,8 +37,8 @@ _MAX_LOADS = 40
 def pictures(trajectory: Trajectory, rate: float) -> list[Picture]:
     """Pictures at multiples of 1/rate and at the end.
 
-    They are those of the replay page in a headless Chromium. Without one they are drawn by
-    matplotlib, with a warning: links as bars, no obstacles.
+    They are those of the replay page in a headless Chromium, with the motion's cautions. Without
+    one they are drawn by matplotlib, with a warning: links as bars, no obstacles.
     rate: pictures per second.
     Raises InputError for a rate that is not positive or gives more than MAX_PICTURES, DisplayError
     for a motion that was saved without its robot.
@@ -111,5 +112,5 @@ def _by_matplotlib(trajectory: Trajectory, times: Array) -> list[Picture]:
     number = {link.name: i for i, link in enumerate(links)}
     bars = [(number[link.parent], i) for i, link in enumerate(links) if link.parent in number]
     places = link_poses(trajectory.robot, links, trajectory.configurations(times), in_world=True)
-    canvas = Bars(places[:, :, :3], SIZE)
+    canvas = Bars(places[:, :, :3], SIZE, caution_lines([trajectory.metadata]))
     return [canvas.draw([here[[a, b], :3] for a, b in bars]) for here in places]

@@ -33,18 +33,21 @@ def self_collision_pairs(
     SRDF disables, and those that overlap at every one of many configurations: a warning names them.
     may_touch: pairs of names of links that may overlap without a warning.
     """
-    apart, touching = _split_pairs(robot)
+    for sentence in pairs_left_out(robot, may_touch):
+        warn(sentence)
+    return _split_pairs(robot)[0]
+
+
+def pairs_left_out(robot: Robot, may_touch: tuple[tuple[str, str], ...] = ()) -> list[str]:
+    """Which pairs are not kept apart, as they always overlap, in sentences; none if all are."""
     allowed = {frozenset(each) for each in may_touch}
-    links = [pair for pair in touching if frozenset(pair) not in allowed]
+    links = [pair for pair in _split_pairs(robot)[1] if frozenset(pair) not in allowed]
     grasped = added_links(robot.model)
     of_robot = [pair for pair in links if grasped.isdisjoint(pair)]
     of_grasped = [pair for pair in links if not grasped.isdisjoint(pair)]
-    if of_robot:
-        warn(_sentence(robot, of_robot, "disable them in an SRDF"))
-    if of_grasped:
-        advice = "name the links in `may_touch` of the grasped object"
-        warn(_sentence(robot, of_grasped, advice))
-    return apart
+    advice = "name the links in `may_touch` of the grasped object"
+    found = [_sentence(robot, of_robot, "disable them in an SRDF")] if of_robot else []
+    return found + ([_sentence(robot, of_grasped, advice)] if of_grasped else [])
 
 
 @lru_cache(maxsize=16)

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import dataclasses
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, ParamSpec, Protocol, cast
 
 from hovi.checks.arguments import check_arguments_except
 from hovi.discrete.grid import Grid
-from hovi.discrete.output.caution import CAUTION
+from hovi.discrete.output.caution import COLLISION, LEFT_OUT, STATUS, WARNED, Caution
 from hovi.discrete.state import State, warn_of_degrees
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError, SceneError, expect, warn
+from hovi.planning.clearance.self_collisions import pairs_left_out
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.limits import as_limits
 from hovi.planning.problem.notation.ends import End, as_end
@@ -21,7 +22,7 @@ from hovi.planning.problem.presolve.findings import findings
 from hovi.planning.problem.presolve.length_slips import grasped_slips
 from hovi.planning.problem.units import Duration, as_duration
 from hovi.planning.refinement.adaptive import first_grid
-from hovi.planning.refinement.error_estimate import with_metadata
+from hovi.planning.refinement.faults.cautions import keeping_warnings, with_cautions_of_motion
 from hovi.planning.search.branch_choice import chosen_ends, nearest_ends
 from hovi.planning.search.final_stages import on_grid_of
 from hovi.planning.search.free_duration import FreeDuration
@@ -87,6 +88,7 @@ def _with_option_keywords(
 @one_blas_thread
 @interruptible
 @shows_progress
+@keeping_warnings
 def plan(
     scene: Scene,
     start: End,
@@ -167,22 +169,29 @@ def with_notes(
 
     scenes: of its segments; what one of them says is said.
     """
-    weighted = options.weight is not None
+    notes = list(_notes(found, scenes, options))
+    said = [each.sentence for each in notes if each.word in (LEFT_OUT, COLLISION)]
+    cautions = notes if found.success else [Caution(STATUS, found.message), *notes]
+    setup = found.setup_seconds if setup_seconds is None else setup_seconds
+    message = " ".join([found.message, *said])
+    found = dataclasses.replace(found, message=message, setup_seconds=setup)
+    return with_cautions_of_motion(found, cautions)
+
+
+def _notes(found: Solution, scenes: Sequence[Scene], options: PlanOptions) -> Iterator[Caution]:
+    """What the scenes and the options leave unsaid or out."""
+    weighted, problem = options.weight is not None, found.problem
     of_scenes = [assumptions(scene, found.trajectory, weighted) for scene in scenes]
-    said = [each for each in of_scenes[0] if all(each in others for others in of_scenes)]
-    against = [] if found.success else [found.message]
+    for each in of_scenes[0]:
+        if all(each in others for others in of_scenes):
+            yield Caution(LEFT_OUT, each)
     if not options.self_collision and found.status not in UNSEEN:
         entered = self_collision_sentence(found.trajectory)
-        said.append(entered)
-        against.append(entered)
-    message = " ".join([found.message, *filter(None, said)])
-    setup = found.setup_seconds if setup_seconds is None else setup_seconds
-    found = dataclasses.replace(found, message=message, setup_seconds=setup)
-    caution = " ".join(filter(None, against))
-    if not caution:
-        return found
-    motion = with_metadata(found.trajectory, **{CAUTION: caution})
-    return dataclasses.replace(found, trajectory=motion)
+        if entered:
+            yield Caution(COLLISION, entered)
+    if options.self_collision and problem is not None and problem.clearance is not None:
+        for each in pairs_left_out(problem.robot, tuple(problem.clearance.may_touch)):
+            yield Caution(WARNED, each)
 
 
 def run(search: Search, began: float) -> Solution:

@@ -12,6 +12,7 @@ from hovi.discrete.measures.segment_spans import SEGMENT_NAMES
 from hovi.errors import InputError, expect
 from hovi.planning.problem.notation.ends import End as Start
 from hovi.planning.problem.notation.ends import as_end
+from hovi.planning.refinement.faults.cautions import keeping_warnings
 from hovi.planning.search.group import in_group, with_others
 from hovi.planning.search.job import Acting
 from hovi.planning.search.option_fields import spell_out
@@ -65,6 +66,7 @@ def _with_option_keywords(
 @one_blas_thread
 @interruptible
 @shows_progress
+@keeping_warnings
 def plan_sequence(
     scene: Scene,
     start: Start,

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from hovi.discrete.output.caution import caution_lines
 from hovi.discrete.trajectory import Trajectory
 from hovi.planning.problem.limit_violation import closeness
 from hovi.planning.solver.outcome.margins import all_distances, least_distance
@@ -37,6 +38,7 @@ def row_of(solution: Solution, warned: str, seconds: float, limit: float | None)
         success=bool(solution.success),
         reason=solution.message,
         warnings=warned,
+        cautions=caution_lines([motion.metadata]),
         cost=_finite(solution.cost),
         effort=_finite(solution.effort),
         error_estimate=_finite(solution.error_estimate),

@@ -82,6 +82,13 @@ class Plans:
         """The number of plans of each status, the most frequent first."""
         return dict(Counter(self.columns["status"]).most_common())
 
+    def by_caution(self) -> dict[str, int]:
+        """The number of minima with each word of caution, the most frequent first."""
+        column = self.columns.get("cautions", [None] * len(self))
+        found = zip(column, self.success, strict=True)
+        words = [{line.partition(":")[0] for line in lines or ()} for lines, ok in found if ok]
+        return dict(Counter(sorted(word for each in words for word in each)).most_common())
+
     def worst(self, count: int) -> list[int]:
         """Rows of the minima that cost most, the costliest first."""
         cost = np.where(self.success, self.numbers("cost"), np.nan)

@@ -14,7 +14,7 @@ SHOWN = ("cost", "error_estimate", "nit", "margin", "least_distance", "seconds")
 
 
 def summary(plans: Plans) -> dict[str, Any]:
-    """JSON-compatible data: counts by status, and quantiles of the columns of minima."""
+    """JSON-compatible data: counts by status and caution, quantiles of columns of minima."""
     success = plans.success
     quantiles = {}
     for name in SHOWN:
@@ -26,6 +26,7 @@ def summary(plans: Plans) -> dict[str, Any]:
         "plans": len(plans),
         "success": int(success.sum()),
         "status": plans.by_status(),
+        "cautions": plans.by_caution(),
         "parameters": list(plans.parameters),
         "quantiles": quantiles,
         "seconds": float(np.nansum(plans.numbers("seconds"))),

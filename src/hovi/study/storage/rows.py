@@ -17,7 +17,8 @@ class PlanRow:
     """The result of a plan, without what depends on the machine or the time.
 
     status: of the Solution, or one of the words above. success, reason: of the Solution.
-    warnings: what was warned of, in one text.
+    warnings: what was warned of, in one text. cautions: of the motion, each after its word and a
+        colon; None of a plan by an earlier version.
     cost, effort, error_estimate, nit, n_neg: of the Solution.
     duration: of the motion, in [s]. intervals: of its grid.
     peak_v, peak_a, peak_tau: largest |v|, |a| and |tau| of each joint.
@@ -33,6 +34,7 @@ class PlanRow:
     success: bool = False
     reason: str = ""
     warnings: str = ""
+    cautions: list[str] | None = None
     cost: float | None = None
     effort: float | None = None
     error_estimate: float | None = None
@@ -58,4 +60,5 @@ class PlanRow:
     @classmethod
     def from_dict(cls, data: Any) -> Self:
         """From JSON. Raises TypeError or KeyError for anything else."""
-        return cls(**{each.name: data[each.name] for each in fields(cls)})
+        known = {"cautions": None} | data
+        return cls(**{each.name: known[each.name] for each in fields(cls)})

@@ -19,7 +19,7 @@ import numpy.typing as npt
 from hovi.checks.arguments import check_arguments_except
 from hovi.discrete.measures.motion_effort import effort_of
 from hovi.discrete.measures.motion_extremes import extremes
-from hovi.discrete.output.caution import caution_of
+from hovi.discrete.output.caution import caution_lines
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import DisplayError, HoviError, expect
 from hovi.flows.execution.dynamics_replay import DynamicsReplay, replay_dynamics
@@ -74,6 +74,7 @@ def report_html(trajectory: Trajectory) -> str:
     return Template(_FRAME.read_text(encoding="utf-8")).substitute(
         title=html.escape(page.title),
         summary=html.escape(_summary(trajectory)),
+        cautions=_cautions(trajectory),
         page=html.escape(page.offline_html()),
         curves=_curves(trajectory),
         certificate=_table(tuple(_certificate(trajectory))),
@@ -96,6 +97,13 @@ def _summary(trajectory: Trajectory) -> str:
     return " ".join(parts)
 
 
+def _cautions(trajectory: Trajectory) -> str:
+    """A list of them; "" without any."""
+    lines = caution_lines([trajectory.metadata])
+    items = "".join(f"<li>{html.escape(each)}</li>" for each in lines)
+    return f"<ul id='cautions'>{items}</ul>" if items else ""
+
+
 def _curves(trajectory: Trajectory) -> str:
     stream = io.BytesIO()
     with matplotlib.rc_context({"svg.hashsalt": _HASH_SALT}):
@@ -106,9 +114,6 @@ def _curves(trajectory: Trajectory) -> str:
 def _certificate(trajectory: Trajectory) -> Iterator[Row]:
     """What was recorded when the motion was planned, and what is checked now."""
     data = trajectory.metadata
-    caution = caution_of(data)
-    if caution:
-        yield "caution", caution
     recorded = {
         "cost": "cost (discrete action)",
         "error_estimate": "estimated error of the cost, relative",

@@ -25,7 +25,7 @@ def fault_on_curve(solution: Solution) -> str:
     """
     problem, trajectory = solution.problem, solution.trajectory
     assert problem is not None
-    if not _has_own_curve(problem):
+    if not has_own_curve(problem):
         return ""
     return _fault_of_integral(solution, problem) or _fault_of_passive(problem, trajectory)
 
@@ -39,17 +39,18 @@ def difference_on_curve(solution: Solution) -> float:
     assert problem is not None
     if len(problem.passive) > 0:
         return np.inf
-    if not _has_own_curve(problem):
+    if not has_own_curve(problem):
         return 0.0
-    action, integral = _costs(solution, problem)
+    action, integral = costs_on_curve(solution, problem)
     return abs(action - integral) / max(abs(integral), least_cost(problem), 1e-300)
 
 
-def _has_own_curve(problem: TrajectoryProblem) -> bool:
+def has_own_curve(problem: TrajectoryProblem) -> bool:
+    """Whether the curve is that of the scheme, as of Galerkin tables."""
     return all(is_galerkin(scheme) for scheme, _ in problem.grid.groups)
 
 
-def _costs(solution: Solution, problem: TrajectoryProblem) -> tuple[float, float]:
+def costs_on_curve(solution: Solution, problem: TrajectoryProblem) -> tuple[float, float]:
     """The cost by the action, and by the integral of L~ along the curve."""
     integral = integral_along(problem.ld.lagrangian, solution.trajectory).value
     return cost_of(problem, solution.trajectory.path), integral + price_of_time(problem)
@@ -83,7 +84,7 @@ def _fault_of_integral(solution: Solution, problem: TrajectoryProblem) -> str:
     accuracy, estimate = solution.accuracy, solution.error_estimate
     if accuracy is not None and estimate is not None and accuracy.along + estimate <= RESOLVED:
         return ""  # both are that close to the cost of the same finer solution
-    action, integral = _costs(solution, problem)
+    action, integral = costs_on_curve(solution, problem)
     if abs(action - integral) <= RESOLVED * max(abs(integral), least_cost(problem)):
         return ""
     return (
