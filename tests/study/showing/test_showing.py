@@ -122,7 +122,7 @@ def test_pieces_put_together_are_the_texts(texts: list[str]) -> None:
     ("arguments", "what"),
     [
         (["show", "missing"], "there is no plans.parquet in missing"),
-        (["show", "FOLDER", "--map", "a.png", "--value", "cots"], "did you mean 'cost'?"),
+        (["show", "FOLDER", "--map", "a.png", "--value", "cots"], "did you mean 'cost'"),
         (["show", "FOLDER", "--map", "a.png", "--value", "status"], "has no numbers"),
         (["show", "FOLDER", "--map", "a.png", "--over", "cost"], "two parameters"),
         (["show", "FOLDER", "--map", "a.txt"], "must end in .png"),
