@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import warnings
 from importlib.util import find_spec
 from pathlib import Path
@@ -13,6 +14,7 @@ import pinocchio as pin
 import pytest
 
 import hovi
+from hovi.cli.application import main
 from hovi.errors import HoviWarning, InputError
 from hovi.planning.clearance.clearance import Clearance
 from hovi.planning.obstacles import convex_parts, mesh
@@ -113,6 +115,42 @@ def test_a_damaged_file_in_the_cache_is_made_again(
         np.savez(kept, part_0=part)
     again = convex_parts.convex_parts(read_mesh(str(u_shape)))
     assert len(again) == len(first)
+
+
+@pytest.fixture
+def endless(u_shape: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A mesh whose division takes more than a minute, and ends then."""
+    worker = tmp_path / "endless.py"
+    worker.write_text("import time\ntime.sleep(100)\n")
+    monkeypatch.setattr(convex_parts, "_WORKER", worker)
+    monkeypatch.setattr(convex_parts, "find_spec", lambda name: True)
+    u_shape.write_text(channel(0.3))  # which no other test has divided
+    return u_shape
+
+
+LATE = r"the time limit of 0\.5 s passed before the obstacles were ready: give more time once"
+
+
+def test_a_time_limit_bounds_the_division_of_a_mesh(endless: Path, two_link: hovi.Robot) -> None:
+    table = {"kind": "mesh", "file": str(endless), "convex_parts": True}
+    with pytest.raises(InputError, match=LATE):
+        hovi.plan(
+            *(hovi.Scene(two_link), [0.0, 0.0], [0.3, 0.7], 1.0),
+            **{"obstacles": [table], "time_limit": 0.5},
+        )
+
+
+@pytest.mark.parametrize("limits", [("0.5", ""), ("", "0.5"), ("100.0", "0.5")])
+def test_a_time_limit_of_a_file_or_command_bounds_the_division_of_a_mesh(
+    endless: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], limits: tuple[str, str]
+) -> None:
+    obstacle = f'[[obstacles]]\nkind = "mesh"\nfile = {str(endless)!r}\nconvex_parts = true\n'
+    key = f"time_limit = {limits[0]}\n" if limits[0] else ""
+    scene = tmp_path / "scene.toml"
+    scene.write_text(key + hovi.example("two_link_reach.toml").read_text() + obstacle)
+    flags = ["--time-limit", limits[1]] if limits[1] else []
+    assert main(["plan", str(scene), *flags]) == 2
+    assert re.search(LATE, capsys.readouterr().err)
 
 
 def test_without_coacd_the_sentence_names_the_extra(

@@ -127,9 +127,11 @@ def _task(scene: str, options: dict[str, Any], compile: bool) -> Task:
     import dataclasses
 
     from hovi.cli.arguments.files import find_scene
+    from hovi.planning.obstacles.preparation import prepared_within
     from hovi.planning.task_file.reading import load_task
 
-    task = load_task(find_scene(scene)).with_options(**options)
+    with prepared_within(options.get("time_limit")):
+        task = load_task(find_scene(scene)).with_options(**options)
     if not compile:
         return task
     return dataclasses.replace(task, scene=dataclasses.replace(task.scene, compile=True))

@@ -15,6 +15,7 @@ from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError, expect, nearest
 from hovi.planning.clearance.clearance import DEFAULT_MARGIN, Clearance
 from hovi.planning.obstacles.obstacle import Obstacle
+from hovi.planning.obstacles.preparation import prepared_within
 from hovi.planning.problem.goals import Via
 from hovi.planning.problem.limits import Limits, as_limits
 from hovi.planning.problem.notation.via_points import as_via
@@ -153,7 +154,9 @@ class PlanOptions:
         None, "full turns of the guess beyond the shortest path, by joint: see State."
     )
     weight: npt.ArrayLike | None = option(
-        None, "weight of each joint's torque in the cost, shape (nv,)."
+        None,
+        "weight of each joint's torque in the cost, shape (nv,), in place of that of the scene's "
+        "effect EffortWeight, if it has one, which the message says then.",
     )
     smooth: bool = option(
         False,
@@ -269,7 +272,8 @@ class PlanOptions:
     def clearance(self) -> Clearance:
         """Obstacles and self-collision, with their margin."""
         touching = [(each.name, other) for each in self.grasped for other in each.may_touch]
-        return Clearance(self.obstacles, self.margin, self.self_collision, touching)
+        with prepared_within(self.time_limit_seconds):
+            return Clearance(self.obstacles, self.margin, self.self_collision, touching)
 
     def with_changes(self, **changes: Any) -> Self:
         """These options with some of them changed; a tolerance replaces a scheme, and vice versa.

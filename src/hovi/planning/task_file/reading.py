@@ -13,6 +13,7 @@ from pydantic import ValidationError
 from hovi.checks.arguments import check_arguments
 from hovi.errors import HoviError, InputError, SceneError, SchemeError
 from hovi.planning.obstacles.obstacle import Obstacle
+from hovi.planning.obstacles.preparation import prepared_within
 from hovi.planning.problem.tolerance import Tolerance
 from hovi.planning.problem.units import as_duration
 from hovi.planning.search.options import INTERVALS_TWICE, TOLERANCE_AND_SCHEME, PlanOptions
@@ -141,7 +142,11 @@ def _obstacles(
         return ()
     from hovi.planning.task_file.obstacle_tables import read_obstacles  # most tasks have none
 
-    return read_obstacles(table.obstacles, options.clearance, robot, toml)
+    try:
+        with prepared_within(options.time_limit_seconds):
+            return read_obstacles(table.obstacles, options.clearance, robot, toml)
+    except InputError as late:
+        raise toml.error(("obstacles",), str(late)) from None
 
 
 def _grasped(table: ShapedTable, robot: Robot, toml: TomlText) -> tuple[tuple[Grasped, ...], Robot]:

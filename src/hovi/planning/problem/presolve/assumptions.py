@@ -11,6 +11,8 @@ from hovi.scene.scene import Scene
 SAMPLES = 257
 """Number of samples of a motion at which the force on a base is compared."""
 
+REPLACED_WEIGHT = "The option weight takes the place of the scene's effect 'effort_weight'."
+
 
 def assumptions(
     scene: Scene, motion: Trajectory | None = None, weighted: bool = False
@@ -18,11 +20,13 @@ def assumptions(
     """What a scene leaves unsaid, a sentence each; none if it says everything.
 
     motion: whose force on a base without motors is quoted. weighted: whether torques have weights
-        that the scene does not know.
+        that the scene does not know, and that replace those of its effect.
     """
     keys = {effect.key for effect in scene.effects}
     sentences = [] if "gravity" in keys else ["Gravity is left out, as the scene does not name it."]
     sentences += _driven_base(scene, motion)
+    if weighted and "effort_weight" in keys:
+        sentences.append(REPLACED_WEIGHT)
     if not weighted and "effort_weight" not in keys:
         sentences += _forces_beside_torques(scene)
     return sentences
