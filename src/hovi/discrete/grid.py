@@ -110,6 +110,17 @@ class Grid(Summarized):
         schemes = [s for s, count in zip(self.schemes, parts, strict=True) for _ in range(count)]
         return Grid(np.repeat(self.steps / parts, parts), tuple(schemes))
 
+    def split_at(self, nodes: Array) -> Grid:
+        """The grid with further nodes inside its intervals.
+
+        nodes: those of this grid and others, ascending, in [s].
+        """
+        if len(nodes) == len(self.t):
+            return self
+        middle = 0.5 * (nodes[:-1] + nodes[1:])
+        of = np.clip(np.searchsorted(self.t, middle) - 1, 0, self.intervals - 1)
+        return Grid(np.diff(nodes), tuple(self.schemes[k] for k in of))
+
     def enriched(self, modes: int) -> Grid:
         """The same intervals with `modes` additional inner modes and points each.
 

@@ -18,6 +18,7 @@ from hovi.planning.refinement.error_estimate import (
     estimate_against,
     finer_than,
 )
+from hovi.planning.refinement.faults.along_motion import may_be_narrow
 from hovi.planning.refinement.limit_sensitivity import cost_of_tolerance
 from hovi.planning.refinement.nodal_hamiltonian import nodal_hamiltonian
 from hovi.planning.refinement.passive_torque import (
@@ -59,6 +60,7 @@ class Candidate:
     finer: the nearby solution on a finer grid, if any. error: estimate in the tolerance's unit;
         NaN if unknown.
     along: relative error of the integral of L~ along the curve; 0 for schemes without a curve.
+    narrow: whether effects may change in a short time, so that the tolerance holds along the curve.
     passive: torques of passive joints along the curve; None as for `passive_torque`.
     uncancelled: the error with the sum of |contributions| instead of their sum, and at least the
         error inferred from the Hamiltonian.
@@ -77,6 +79,7 @@ class Candidate:
     passive: PassiveTorque | None = None
     contradicted: float = 0.0
     later: float = 0.0
+    narrow: bool = False
 
     @classmethod
     def of(
@@ -100,7 +103,8 @@ class Candidate:
         passive = passive_torque(solution.problem, solution.trajectory)
         if tolerance.quantity is Quantity.COST:
             errors = _errors_of_cost(solution, finer, tolerance)
-            return cls(solution, tolerance, finer, *errors, along, passive)
+            narrow = may_be_narrow(solution.problem.ld.lagrangian)
+            return cls(solution, tolerance, finer, *errors, along, passive, narrow=narrow)
         error = tolerance.measure(estimate_against(solution, finer, tolerance.frame))
         return cls(solution, tolerance, finer, error, error, along, passive)
 
@@ -155,6 +159,8 @@ class Candidate:
     @property
     def _largest_along(self) -> float:
         cost = self.tolerance.quantity is Quantity.COST
+        if cost and self.narrow:
+            return self.tolerance.size
         return max(self.tolerance.size, CURVE_TOLERANCE) if cost else CURVE_TOLERANCE
 
     @property
@@ -163,6 +169,7 @@ class Candidate:
         if self.finer is None:
             return None
         own = error_of_cost(self.solution, self.finer)
+        own = max(own, self.along) if self.narrow else own
         return max(own, self.contradicted, self.later)
 
     def contradicts(self, earlier: Candidate) -> bool:

@@ -29,6 +29,7 @@ from hovi.planning.refinement.error_estimate import (
     with_estimate,
     with_metadata,
 )
+from hovi.planning.refinement.faults.narrow_features import with_features
 from hovi.planning.refinement.faults.on_curve import (
     RESOLVED,
     costs_nothing,
@@ -37,6 +38,7 @@ from hovi.planning.refinement.faults.on_curve import (
     fault_on_curve,
     least_cost,
 )
+from hovi.planning.refinement.faults.remedy import remedy
 from hovi.planning.refinement.limit_sensitivity import limit_prices
 from hovi.planning.refinement.whirling import (
     fault_of_distance,
@@ -142,7 +144,8 @@ def resolved(solution: Solution) -> Solution:
         `fault_of_whirling`;
     (e) without limits, the finer solution is near, or a still finer one is much closer to it: see
         `fault_of_distance`;
-    (f) it is usable: see `judged`.
+    (f) no effect has features between the points that change the cost by more: see `features_of`;
+    (g) it is usable: see `judged`.
     Solutions of another status are returned unchanged. If the deadline in force passes before
     all of this is known, the status is TIME_LIMIT.
     """
@@ -168,7 +171,8 @@ def _checked(solution: Solution) -> tuple[Solution, str, FinerSolution | None]:
     """The solution with an estimate, why it is no minimum along its way or "", and a finer one."""
     reason, finer = fault_of_period(solution) or fault_on_curve(solution), None
     if solution.status is Status.STATIONARY:
-        return *((solution, reason) if reason else _compared_with_stationary(solution)), None
+        solution, reason = (solution, reason) if reason else _compared_with_stationary(solution)
+        return *((solution, reason) if reason else with_features(solution)), None
     if not reason and solution.error_estimate is None and solution.accuracy is None:
         solution, reason, finer = _compared_with_finer(solution)
     elif not reason and not costs_nothing(solution):
@@ -176,6 +180,8 @@ def _checked(solution: Solution) -> tuple[Solution, str, FinerSolution | None]:
     error = None if costs_nothing(solution) else solution.error_estimate
     for fault_of in (fault_of_whirling, fault_of_distance):
         reason = reason or fault_of(solution, error, finer)
+    if not reason:
+        solution, reason = with_features(solution)
     return solution, reason, finer
 
 
@@ -248,9 +254,11 @@ class Resolution(MotionCheck):
         reason = fault_of_period(solution)
         if self.on_curve > SMALL_DIFFERENCE:
             reason = reason or fault_on_curve(solution)
+        if not reason:
+            solution, reason = with_features(with_estimate(solution, estimate))
         if reason:
             return _unresolved(solution, reason)
-        return dataclasses.replace(with_estimate(solution, estimate), check=self)
+        return dataclasses.replace(solution, check=self)
 
     def _followed(self, solution: Solution) -> Solution | None:
         """As `resolved`, compared with the followed finer solution; None where that fails."""
@@ -265,6 +273,9 @@ class Resolution(MotionCheck):
         compared, reason = _compared(solution, finer)
         if reason or compared.error_estimate is None:
             return None
+        compared, reason = with_features(compared)
+        if reason:
+            return _unresolved(compared, reason)
         return dataclasses.replace(compared, check=Resolution.of(compared, finer))
 
     def shifted(self, shift: Shift, problem: TrajectoryProblem) -> Check:
@@ -366,7 +377,7 @@ def _unresolved(solution: Solution, reason: str) -> Solution:
     what = "a minimum" if solution.status is Status.MINIMUM else "stationary"
     message = (
         f"the motion is {what} on {solution.problem.grid.intervals} intervals, which do not "
-        f"resolve it: {reason}; {_remedy(solution)}."
+        f"resolve it: {reason}; {remedy(solution, reason)}."
     )
     return without_success(solution, Status.UNRESOLVED, message)
 
@@ -380,17 +391,3 @@ def _not_checked(solution: Solution) -> Solution:
         "a finer grid; allow more time."
     )
     return without_success(solution, Status.TIME_LIMIT, message)
-
-
-def _remedy(solution: Solution) -> str:
-    """What to do: against whirling if a joint whirls, else with the grid or the search."""
-    whirling = whirl(solution)
-    if whirling is not None:
-        return str(whirling)
-    if solution.accuracy is None:
-        return (
-            "use more intervals or a scheme with more modes, or name neither, so that plan chooses"
-        )
-    limited = solution.problem is not None and solution.problem.limited
-    way = "try" if limited else "set limits or try"
-    return f"{way} another initial guess, more starts or smooth"

@@ -14,6 +14,7 @@ from hovi.discrete.trajectory import Trajectory
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.problem.tolerance import Round, Tolerance
 from hovi.planning.refinement.adaptive import first_grid, refine_to_tolerance
+from hovi.planning.refinement.faults.narrow_features import features_of
 from hovi.planning.refinement.inactive_limits import (
     far_from_limits,
     with_limits_again,
@@ -36,6 +37,9 @@ MAX_CHART_ROUNDS = 4
 """Maximum number of rounds that halve intervals in which an orientation turns too far."""
 MAX_REFINED = 6
 """Maximum number of coarse minima that are refined and ranked."""
+MAX_FEATURE_ROUNDS, MAX_FEATURE_INTERVALS = 6, 600
+"""Maximum number of grids with nodes where a minimum has narrow features, and of their intervals.
+"""
 LEAST_STEPS = 2
 """Number of steps on the requested grid without time for which it is not tried."""
 _Each = TypeVar("_Each")
@@ -151,6 +155,30 @@ class FinalStages:
             better = with_limits_again(free, known)
         return refine(known, time_limit=self.deadline.seconds_left) if better is None else better
 
+    def seeing_features(self, tolerance: Tolerance, best: Solution) -> Solution:
+        """The minimum on grids with nodes where its points miss a narrow feature of an effect.
+
+        A wall in q that a motion crosses, for instance, at most MAX_FEATURE_ROUNDS times: what is
+        missed after that is left to the last check.
+        """
+        for _ in range(MAX_FEATURE_ROUNDS):
+            known = best.success and not interrupted() and not self.deadline.passed
+            features = features_of(best) if known else None
+            if features is None or not features.fault or features.along.fault:
+                break
+            grid = features.seen_by(best.trajectory.grid)
+            if grid.intervals > MAX_FEATURE_INTERVALS:
+                break
+            self.progress("looking at narrow features again", 0.9)
+            job = split_for_charts(self.fine.on(grid), best.trajectory)
+            again = self._solve(job, best.trajectory)
+            if not again.success:
+                break
+            again = dataclasses.replace(again, problem=again.problem or job.problem())
+            refined = self._refined(tolerance, "", again)
+            best = refined if refined.success else best
+        return best
+
     def _from_guess(self) -> Solution:
         """A solve from the guess on the first grid with more quadrature points."""
         job = with_more_points(self.fine)
@@ -223,7 +251,7 @@ def has_few_points(job: Job) -> bool:
 def with_more_points(job: Job) -> Job:
     """The job on the first grid with more quadrature points."""
     grid = first_grid(job.grid.duration, job.options.interval_count, order=job.grid.order)
-    return split_for_charts(job.on(grid), job.options.guess)
+    return split_for_charts(job.on(job.graded(grid)), job.options.guess)
 
 
 def on_grid_of(problem: TrajectoryProblem, solution: Solution) -> TrajectoryProblem:

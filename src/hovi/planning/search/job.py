@@ -17,6 +17,7 @@ from hovi.errors import ChartError
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.goals import Via
 from hovi.planning.problem.limits import Limits, as_limits
+from hovi.planning.problem.presolve.formulas_of_time import graded
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.problem.tolerance import LAST_BARRIER, Tolerance
 from hovi.planning.search.options import PlanOptions
@@ -121,6 +122,20 @@ class Job:
     def on(self, grid: Grid) -> Self:
         """The job on another grid."""
         return dataclasses.replace(self, grid=grid)
+
+    def graded(self, grid: Grid) -> Grid:
+        """The grid with nodes where formulas of time change, unless the options name the grid."""
+        return grid if self.tolerance is None else self._graded(grid)[0]
+
+    @property
+    def fault_of_time(self) -> str:
+        """What no grid of its options resolves of the formulas of time, a clause; "" if nothing."""
+        return "" if self.tolerance is None else self._graded(self.grid)[1]
+
+    def _graded(self, grid: Grid) -> tuple[Grid, str]:
+        acting = [part.acting.on(self.scene) for part in self.parts] or [self.scene]
+        ends = [*(T * grid.duration / self.grid.duration for T in self.ends), grid.duration]
+        return graded(grid, tuple(zip(acting, ends, strict=True)))
 
     def lagrangian(self) -> Lagrangian:
         """The effort of the scene, or of the scene of every segment."""

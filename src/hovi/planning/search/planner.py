@@ -33,7 +33,7 @@ from hovi.planning.search.options import PlanOptions
 from hovi.planning.search.search import Search
 from hovi.planning.search.smoothing import smoothed
 from hovi.planning.solver.outcome.self_collision import self_collision_sentence
-from hovi.planning.solver.outcome.without_solve import infeasible_at_once
+from hovi.planning.solver.outcome.without_solve import infeasible_at_once, unresolved_at_once
 from hovi.planning.solver.solver import Solution
 from hovi.planning.solver.status import Status
 from hovi.robot.robot import Robot
@@ -148,6 +148,9 @@ def plan(
     if found.reason:
         nothing = infeasible_at_once(longest, chosen.guess, found.reason)
         return with_notes(nothing, [job.scene], job.options, time.perf_counter() - began)
+    if fault := job.fault_of_time:
+        nothing = unresolved_at_once(problem, chosen.guess, fault)
+        return with_notes(nothing, [job.scene], job.options, time.perf_counter() - began)
     if FrameGoal in map(type, given):
         ends = chosen_ends(scene, *given, T, chosen, deadline)
         job = search.job(ends, deadline, job.scene if ends[0] is job.start else None)
@@ -239,7 +242,8 @@ class _Planning:
         grid = _grid(T, options, scene, self.free is not None)
         with deadline.in_force():
             scene.effort_lagrangian(options.weight)  # its functions may have to be compiled
-        return split_for_charts(Job(scene, grid, *ends, options), options.guess)
+            job = Job(scene, grid, *ends, options)
+        return split_for_charts(job.on(job.graded(grid)), options.guess)
 
 
 def _time(

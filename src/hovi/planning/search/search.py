@@ -25,7 +25,13 @@ from hovi.planning.search.final_stages import (
 )
 from hovi.planning.search.free_duration import FreeDuration
 from hovi.planning.search.job import Job, split_for_charts
-from hovi.planning.search.multistart import Exploration, Pool, default_processes, explore
+from hovi.planning.search.multistart import (
+    Exploration,
+    Pool,
+    default_processes,
+    distinct,
+    explore,
+)
 from hovi.planning.solver.initial_path import guess_path
 from hovi.planning.solver.methods.active_pairs import with_clearance
 from hovi.planning.solver.solver import Solution
@@ -186,6 +192,7 @@ class Search:
                 coarse = coarse.with_nodes(self.fine.node_times)
             except InputError:  # too few nodes for the via points
                 return self.fine
+        coarse = self.fine.graded(coarse)
         job = split_for_charts(self.fine.on(coarse), self.fine.options.guess)
         return job if job.grid.intervals < grid.intervals else self.fine
 
@@ -230,7 +237,10 @@ class Search:
         yield (found := self._continued(job, found))
         if self.fine.tolerance is not None and self.free is None:
             raise_if_interrupted()
-            yield (found := stages.to_tolerance(self.fine.tolerance, found))
+            found = stages.to_tolerance(self.fine.tolerance, found)
+            yield found
+            seen = stages.seeing_features(self.fine.tolerance, found[0])
+            yield (found := found if seen is found[0] else distinct([seen, *found[1:]]))
         elif job is not self.fine:
             raise_if_interrupted()
             on_grid = stages.to_requested_grid(found, self.free is not None)

@@ -22,6 +22,7 @@ from hovi.planning.search.search import Search
 from hovi.planning.sequence.branches import End
 from hovi.planning.sequence.segment import Segment, Table, checked_segments, goals_of, names_of
 from hovi.planning.sequence.sequence_job import job_of
+from hovi.planning.solver.outcome.without_solve import unresolved_at_once
 from hovi.planning.solver.solver import Solution
 from hovi.scene.scene import Scene
 from hovi.system.blas_threads import one_blas_thread
@@ -113,8 +114,11 @@ def plan_sequence(
     job.problem()  # raises for invalid input before the search
     warn_of_ends(scene.robot, job.start, job.goal, job.options)
     without = job.with_options(self_collision=False) if chosen.self_collision else None
-    solution = run(Search(job, deadline, progress or silent, None, without), began)
     scenes = [part.acting.on(job.scene) for part in job.parts]
+    if fault := job.fault_of_time:
+        solution = unresolved_at_once(job.problem(), job.options.guess, fault)
+    else:
+        solution = run(Search(job, deadline, progress or silent, None, without), began)
     return _named(with_notes(solution, scenes, job.options), parts)
 
 

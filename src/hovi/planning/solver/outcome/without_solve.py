@@ -25,6 +25,19 @@ def minimum_at(
     return solution_of(result, 0.0, seconds)
 
 
+def unresolved_at_once(
+    problem: TrajectoryProblem, guess: str | Trajectory | DiscretePath, reason: str
+) -> Solution:
+    """The guess of a problem that no grid resolves. reason: as a clause."""
+    path = guess_path(problem, guess)
+    message = (
+        f"no motion was sought, since no grid would resolve it: {reason}; make what changes wider "
+        "than that, or leave it out."
+    )
+    value = problem.ld.action(path)
+    return solution_of(MethodResult(problem, path, value, Status.UNRESOLVED, message), 0.0, 0.0)
+
+
 def infeasible_at_once(
     problem: TrajectoryProblem, guess: str | Trajectory | DiscretePath, reason: str
 ) -> Solution:

@@ -1,0 +1,278 @@
+"""The cost along a motion with all narrow features of its effects, however few points a grid has.
+
+Time is bisected until the effects are bounded to change little in every part, see `Enclosure`, and
+Gauss points in the parts integrate the Lagrangian.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import field
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi.discrete.trajectory import Trajectory
+from hovi.effects.expressions.interval_rules import Array, Bound
+from hovi.effects.expressions.time_parts import TimePart, from_line
+from hovi.planning.problem.presolve.formulas_of_time import base_parts
+from hovi.planning.refinement.faults.effect_bounds import effect_bounds
+from hovi.scene.lagrangian import Lagrangian
+from hovi.scene.scene import Scene
+from hovi.scene.segmented_lagrangian import SegmentedLagrangian
+from hovi.system.dataclass import dataclass
+
+Index = npt.NDArray[np.intp]
+
+CHANGE = 1.0
+"""Largest change of the argument of a function in a part of time, as in exp(x) or sin(x)."""
+FIRST_PARTS = 4
+"""Least number of parts of an interval."""
+INSTANTS = 2000
+"""Least number of instants at which a Lagrangian without bounds is looked at."""
+MAX_PARTS = 20_000
+"""Maximum number of parts of a motion."""
+LEAST_SHARE = 2.0**-34
+"""Shortest part, relative to the duration."""
+_RULES = [np.polynomial.legendre.leggauss(points) for points in (6, 10)]
+_S = np.concatenate([(x + 1) / 2 for x, _ in _RULES])
+"""The points of both rules in [0, 1]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Parts:
+    """Parts of intervals. interval: their numbers. begin, end: in [0, 1], all of shape (P,)."""
+
+    interval: Index
+    begin: Array
+    end: Array
+
+    @classmethod
+    def of(cls, intervals: int, number: int) -> Parts:
+        """Equal parts of every interval."""
+        k, s = np.repeat(np.arange(intervals), number), np.arange(number) / number
+        return cls(k, np.tile(s, intervals), np.tile(s + 1 / number, intervals))
+
+    def __len__(self) -> int:
+        return len(self.begin)
+
+    def chosen(self, which: npt.NDArray[np.bool_] | Index) -> Parts:
+        """Some of them."""
+        return Parts(self.interval[which], self.begin[which], self.end[which])
+
+    def halves(self) -> Parts:
+        """Both halves of each, the left ones first."""
+        middle, k = 0.5 * (self.begin + self.end), np.tile(self.interval, 2)
+        return Parts(k, np.append(self.begin, middle), np.append(middle, self.end))
+
+    def joined(self, others: Parts) -> Parts:
+        """These and others."""
+        pairs = zip(*((x.interval, x.begin, x.end) for x in (self, others)), strict=True)
+        k, begin, end = (np.concatenate(pair) for pair in pairs)
+        return Parts(k, begin, end)
+
+
+@dataclass(frozen=True, eq=False)
+class AlongMotion:
+    """The integral of a Lagrangian along a motion, in parts that resolve its effects.
+
+    cost: the integral. error: bound of what it may miss. by_interval: of the motion's grid, (N,).
+    parts: of time. fault: what no parts resolve, as a clause; "" if nothing.
+    sampled: names of effects without bounds, which are looked at at INSTANTS instants.
+    """
+
+    cost: float
+    error: float
+    by_interval: Array
+    parts: Parts
+    fault: str
+    sampled: tuple[str, ...] = ()
+
+
+def along_motion(
+    lagrangian: Lagrangian, motion: Trajectory, cost: float, error: float
+) -> AlongMotion:
+    """The integral along a motion.
+
+    cost: about that of the motion, positive. error: that the integral may have, relative to it.
+    """
+    seen = [_Seen(scene) for scene in _scenes(lagrangian)]
+    return _Look(lagrangian, motion, cost, error * cost, seen).run()
+
+
+def may_be_narrow(lagrangian: Lagrangian) -> bool:
+    """Whether anything in a Lagrangian may change in a short time of a smooth motion.
+
+    Not where its effects add sums and products of q, v and a alone to the dynamics.
+    """
+    return any(_Seen(scene).anything for scene in _scenes(lagrangian))
+
+
+def _scenes(lagrangian: Lagrangian) -> list[Scene | None]:
+    """The scene of every segment."""
+    if isinstance(lagrangian, SegmentedLagrangian):
+        return [scene for each in lagrangian.lagrangians for scene in _scenes(each)]
+    scene = getattr(lagrangian, "scene", None)
+    return [scene if isinstance(scene, Scene) and lagrangian.output_weight.size else None]
+
+
+class _Seen:
+    """What may have narrow features in a scene; without one anything may, and has no bounds."""
+
+    def __init__(self, scene: Scene | None) -> None:
+        self.effects = () if scene is None else effect_bounds(scene)
+        self.base: tuple[TimePart, ...] = () if scene is None else base_parts(scene)
+        self.bounded = [each for each in self.effects if each.value.known and each.rate.known]
+        names = [each.name for each in self.effects if each not in self.bounded]
+        self.sampled = ("the Lagrangian",) if scene is None else tuple(dict.fromkeys(names))
+        self.anything = bool(self.effects or self.base or scene is None)
+        values = [each.value for each in self.bounded] + [each.value for each in self.base]
+        self.peaks = [np.zeros(value.size) for value in values]
+
+
+@dataclass(eq=False)
+class _Look:
+    """See `along_motion`. budget: error that the integral may have. seen: of each segment."""
+
+    lagrangian: Lagrangian
+    motion: Trajectory
+    cost: float
+    budget: float
+    seen: list[_Seen]
+    squares: dict[int, float] = field(default_factory=dict)
+    fault: str = ""
+
+    def run(self) -> AlongMotion:
+        """Bisect, then integrate."""
+        N, sampled = self.motion.grid.intervals, tuple(x for s in self.seen for x in s.sampled)
+        least = -(-INSTANTS // (10 * N)) if sampled else 0
+        parts, unseen = self._bisected(Parts.of(N, max(FIRST_PARTS, least)), self._deviation)
+        parts, error = self._bisected(parts, self._rule_error)
+        values = self._integrals(parts)[1]
+        by_interval = np.bincount(parts.interval, values, minlength=N).astype(np.float64)
+        cost = float(by_interval.sum())
+        return AlongMotion(cost, unseen + error, by_interval, parts, self.fault, sampled)
+
+    def _bisected(
+        self, parts: Parts, error_of: Callable[[Parts], tuple[Array, list[str]]]
+    ) -> tuple[Parts, float]:
+        """Parts that are bisected until the sum of their errors is within the budget, and it.
+
+        error_of: errors, (P,), and names of what causes them.
+        """
+        grid, limit = self.motion.grid, LEAST_SHARE * self.motion.duration
+        errors, names = error_of(parts)
+        while errors.sum() > self.budget:
+            cut = errors > self.budget / (2 * len(parts))
+            steps = grid.steps[parts.interval] * (parts.end - parts.begin)
+            if steps[cut].min() < 2 * limit or len(parts) + np.count_nonzero(cut) > MAX_PARTS:
+                i = int(np.argmax(errors))
+                t = grid.t[parts.interval[i]] + parts.begin[i] * grid.steps[parts.interval[i]]
+                self.fault = (
+                    self.fault or f"{names[i]} changes within {steps[i]:.2g} s at {t:.6g} s"
+                )
+                break
+            halves = parts.chosen(cut).halves()
+            more, of = error_of(halves)
+            parts = parts.chosen(~cut).joined(halves)
+            errors = np.append(errors[~cut], more)
+            names = [x for x, gone in zip(names, cut, strict=True) if not gone] + of
+        return parts, float(errors.sum())
+
+    def _rule_error(self, parts: Parts) -> tuple[Array, list[str]]:
+        """The differences of two Gauss rules in each part."""
+        fewer, value = self._integrals(parts)
+        return np.abs(value - fewer), ["the cost"] * len(parts)
+
+    def _integrals(self, parts: Parts) -> Array:
+        """The integral of L over each part by two rules, shape (2, P)."""
+        k, s = np.repeat(parts.interval, len(_S)), _inside(parts, _S)
+        jet = self.motion.jet_intervals(k, s, self.lagrangian.order)
+        t = self.motion.t[k] + s * self.motion.grid.steps[k]
+        values = self.lagrangian.value(*jet, t=t).reshape(len(parts), -1)
+        steps = self.motion.grid.steps[parts.interval] * (parts.end - parts.begin)
+        fewer = len(_RULES[0][0])
+        pairs = zip(_RULES, (values[:, :fewer], values[:, fewer:]), strict=True)
+        return np.stack([steps * (x @ rule[1]) / 2 for rule, x in pairs])
+
+    def _deviation(self, parts: Parts) -> tuple[Array, list[str]]:
+        """How much of the cost the effects may hide in each part, at most, and which of them."""
+        errors, names = np.zeros(len(parts)), [""] * len(parts)
+        for number, seen in enumerate(self.seen):
+            here = np.flatnonzero(self._segments[parts.interval] == number)
+            if len(here) == 0 or not (seen.bounded or seen.base):
+                continue
+            found = self._of_scene(seen, parts.chosen(here))
+            total = sum(each for _, each in found)
+            largest = np.argmax([each for _, each in found], axis=0)
+            errors[here] = total
+            for place, which in zip(here, largest, strict=True):
+                names[place] = found[which][0]
+        return errors, names
+
+    @cached_property
+    def _segments(self) -> Index:
+        if isinstance(self.lagrangian, SegmentedLagrangian):
+            return self.lagrangian.segments_of(self.motion.t)
+        return np.zeros(self.motion.grid.intervals, dtype=np.intp)
+
+    def _of_scene(self, seen: _Seen, parts: Parts) -> list[tuple[str, Array]]:
+        """What each effect of a scene may hide, (P,) each, with its name."""
+        steps = self.motion.grid.steps[parts.interval] * (parts.end - parts.begin)
+        boxes, rates, tau = self._boxes(parts, steps)
+        found = []
+        for effect, peaks in zip(seen.bounded, seen.peaks, strict=False):
+            bounds = effect.value(boxes, CHANGE, peaks)
+            away = from_line(bounds, effect.rate([*boxes, *rates], CHANGE), steps[:, None])
+            away[bounds.calm] = 0.0
+            cost = self._cost_of_torque(tau, away) if effect.is_torque else away.sum(axis=1)
+            found.append((effect.name, steps * cost))
+        for part, peaks in zip(seen.base, seen.peaks[len(seen.bounded) :], strict=True):
+            found.append((part.name, self._of_base(part, peaks, parts, steps)))
+        return found
+
+    def _cost_of_torque(self, tau: Array, away: Array) -> Array:
+        """R (|tau| + dtau) dtau for a change dtau of torques of absolute values |tau|, (P,)."""
+        R = self.lagrangian.output_weight[: tau.shape[1]]
+        with np.errstate(invalid="ignore"):
+            products = np.where(away == 0, 0.0, (tau + away) * away)
+        return np.asarray(products @ R)
+
+    def _of_base(self, part: TimePart, peaks: Array, parts: Parts, steps: Array) -> Array:
+        """The share of the cost that a part of the base's motion may hide: that in its square."""
+        begin = self.motion.t[parts.interval] + parts.begin * self.motion.grid.steps[parts.interval]
+        away, size = part.deviation(begin, begin + steps, peaks)
+        whole = self.squares.setdefault(id(part), float(np.sum(size**2 * steps)))
+        return self.cost * 2.0 * away * size * steps / max(whole, 1e-300)
+
+    def _boxes(self, parts: Parts, steps: Array) -> tuple[list[Bound], list[Bound], Array]:
+        """Bounds of (q, v, a, tau, t) in each part, of (da/dt, dtau/dt), and the largest |tau|."""
+        k, s = np.repeat(parts.interval, 3), _inside(parts, np.array([0.0, 0.5, 1.0]))
+        sample = self.motion.sample_intervals(k, s)
+        t = self.motion.t[k] + s * self.motion.grid.steps[k]
+        triples = [x.reshape(len(parts), 3, -1) for x in (*sample, t)]
+        changes = [2.0 * np.diff(triples[i], axis=1) / steps[:, None, None] for i in (2, 3)]
+        tau = np.abs(triples[3]).max(axis=1)
+        return [_between(x) for x in triples], [_slopes(x) for x in changes], tau
+
+
+def _inside(parts: Parts, s: Array) -> Array:
+    """Positions s in [0, 1] of each part, as those of its interval, one part after the other."""
+    positions = parts.begin[:, None] + (parts.end - parts.begin)[:, None] * s
+    return np.clip(positions, 0.0, 1.0).ravel()
+
+
+def _between(x: Array) -> Bound:
+    """Bounds of a smooth curve from its ends and its middle, (P, 3, n), with a margin.
+
+    A parabola leaves them by at most a quarter of the middle's distance from the line.
+    """
+    bend = np.abs(x[:, 1] - 0.5 * (x[:, 0] + x[:, 2]))
+    return x.min(axis=1) - bend, x.max(axis=1) + bend
+
+
+def _slopes(x: Array) -> Bound:
+    """Bounds of a derivative from the slopes in both halves, (P, 2, n), with a margin."""
+    bend = np.abs(x[:, 1] - x[:, 0])
+    return x.min(axis=1) - bend, x.max(axis=1) + bend
