@@ -10,6 +10,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -36,25 +37,25 @@ class Case:
 
     name: str
     effect: object
-    y: Callable[[Array, hovi.Sample], Array]
+    y: Callable[[Array, Any], Array]
     center: float
     width: float
-    density: Callable[[Array, hovi.Sample, Array], Array]
+    density: Callable[[Array, Any, Array], Array]
 
 
 def gauss(y: Array, c: float, w: float) -> Array:
     return np.exp(-(((y - c) / w) ** 2))
 
 
-def time(t: Array, z: hovi.Sample) -> Array:
+def time(t: Array, z: Any) -> Array:
     return t
 
 
-def shoulder(t: Array, z: hovi.Sample) -> Array:
+def shoulder(t: Array, z: Any) -> Array:
     return z.q[:, 0]
 
 
-def speed(t: Array, z: hovi.Sample) -> Array:
+def speed(t: Array, z: Any) -> Array:
     return z.v[:, 0]
 
 
@@ -118,7 +119,7 @@ def two_pulses(c: float, w: float) -> Case:
 def jolt(c: float, w: float) -> Case:
     A = 0.02 * w
 
-    def density(t: Array, z: hovi.Sample, tau: Array) -> Array:
+    def density(t: Array, z: Any, tau: Array) -> Array:
         u = (t - c) / w
         lift = A / w**2 * (4 * u**2 - 2) * np.exp(-(u**2))
         weight = [pin.computeGeneralizedGravity(MODEL, MODEL.createData(), q) for q in z.q]
@@ -129,12 +130,12 @@ def jolt(c: float, w: float) -> Case:
 
 
 def cost(
-    name: str, y: Callable[[Array, hovi.Sample], Array], formula: str, c: float, w: float, A: float
+    name: str, y: Callable[[Array, Any], Array], formula: str, c: float, w: float, A: float
 ) -> Case:
     more = "*v['shoulder']**2" if y is time else ""
     text = f"{A}*exp(-(({formula}-{c})/{w})**2){more}"
 
-    def density(t: Array, z: hovi.Sample, tau: Array) -> Array:
+    def density(t: Array, z: Any, tau: Array) -> Array:
         factor = z.v[:, 0] ** 2 if y is time else 1.0
         return half_square(tau) + A * gauss(y(t, z), c, w) * factor
 
@@ -142,7 +143,7 @@ def cost(
 
 
 def reference(c: float, w: float) -> Case:
-    def density(t: Array, z: hovi.Sample, tau: Array) -> Array:
+    def density(t: Array, z: Any, tau: Array) -> Array:
         r = 0.4 * np.tanh((t - c) / w)
         return half_square(tau) + 20 * (z.q[:, 0] - r) ** 2
 
@@ -151,7 +152,7 @@ def reference(c: float, w: float) -> Case:
 
 
 def friction(c: float, w: float) -> Case:
-    def density(t: Array, z: hovi.Sample, tau: Array) -> Array:
+    def density(t: Array, z: Any, tau: Array) -> Array:
         return half_square(tau + 3.0 * np.tanh(z.v / w))
 
     effect = E.DryFriction(coulomb=3.0, width=w)
@@ -159,7 +160,7 @@ def friction(c: float, w: float) -> Case:
 
 
 def wall(c: float, w: float) -> Case:
-    def density(t: Array, z: hovi.Sample, tau: Array) -> Array:
+    def density(t: Array, z: Any, tau: Array) -> Array:
         return half_square(tau) + 8 * (1 + np.tanh((z.q[:, 0] - c) / w))
 
     text = f"8*(1+tanh((q['shoulder']-{c})/{w}))"
