@@ -8,6 +8,7 @@ import numpy.typing as npt
 from hovi.discrete.trajectory import Trajectory
 from hovi.planning.clearance.clearance import DISTANCE_SCALE
 from hovi.planning.clearance.distances import Distances
+from hovi.planning.clearance.fast_obstacles import FastPairs
 from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
@@ -48,6 +49,7 @@ def approach_along(
     reach: distance in [m] beyond which a lower bound of at least that is enough.
     """
     nearest, at = _nearest(*_sampled(trajectory, distances, reach))
+    nearest, at = _with_fast(trajectory, distances, least + REFINEMENT_DISTANCE, nearest, at)
     return _refined(trajectory, distances, nearest, at, least + REFINEMENT_DISTANCE)
 
 
@@ -55,6 +57,7 @@ def near_pairs(trajectory: Trajectory, distances: Distances, least: float) -> np
     """Numbers of the pairs that come nearer than `least`, in [m], anywhere along a motion."""
     below = least + REFINEMENT_DISTANCE
     nearest, at = _nearest(*_sampled(trajectory, distances, below))
+    nearest, at = _with_fast(trajectory, distances, below, nearest, at)
     closest = nearest.min(axis=0)
     unclear = np.flatnonzero((closest >= least) & (closest < below))
     some = distances.restricted(unclear.tolist())
@@ -85,6 +88,45 @@ def _nearest(s: Array, d: Array) -> tuple[Array, Array]:
     """The smallest of the sampled distances in every interval, and where, (N, K)."""
     index = np.argmin(d, axis=1)
     return np.take_along_axis(d, index[:, None], axis=1)[:, 0], s[index]
+
+
+def _with_fast(
+    trajectory: Trajectory, distances: Distances, below: float, nearest: Array, at: Array
+) -> tuple[Array, Array]:
+    """The smallest distances with those between samples of obstacles that move fast.
+
+    below: distance below which they are wanted, in [m].
+    """
+    if not distances.paths:
+        return nearest, at
+    N, s = trajectory.grid.intervals, np.linspace(0.0, 1.0, SAMPLES)
+    k = np.repeat(np.arange(N), SAMPLES)
+    t = np.minimum(trajectory.t[k] + np.tile(s, N) * trajectory.grid.steps[k], trajectory.duration)
+    fast = FastPairs.of(distances, t, trajectory.configurations(t))
+    if fast is None:
+        return nearest, at
+    some = distances.restricted(fast.numbers.tolist())
+
+    def measure(times: Array, column: npt.NDArray[np.intp]) -> Array:
+        return wanted_values(some, some.at(trajectory.configurations(times), times), column)
+
+    found = fast.between(distances_over_time(trajectory, some, t), below, measure)
+    nearest, at = nearest.copy(), at.copy()
+    for i in np.argsort(-found.value):
+        interval = min(int(np.searchsorted(trajectory.t, found.t[i], side="right")) - 1, N - 1)
+        place = interval, fast.numbers[found.column[i]]
+        if found.value[i] < nearest[place]:
+            nearest[place] = found.value[i]
+            at[place] = (found.t[i] - trajectory.t[interval]) / trajectory.grid.steps[interval]
+    return nearest, at
+
+
+def wanted_values(distances: Distances, q: Array, column: npt.NDArray[np.intp]) -> Array:
+    """One distance at each configuration, (C,), in [m]. column: numbers of the pairs, (C,)."""
+    rows = np.arange(len(q))
+    wanted = np.zeros((len(q), len(distances.pairs)), dtype=bool)
+    wanted[rows, column] = True
+    return distances.values(q, np.inf, wanted)[rows, column]
 
 
 def _measured(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 
 import numpy as np
@@ -54,6 +54,7 @@ class Distances:
     ends: indices of their shapes in the geometry.
     paths: along which obstacles move. If there are any, configurations have their time as one more
         column: see `at`.
+    moving: numbers of these by those of the shapes that move along them.
     allowance: by which a pair may be closer than the margin, shape (K,), in [m]; it is added to
         the distances, so that all pairs have the same bound.
     Raises ModelError where shapes are missing, or nothing can collide, and InputError for names
@@ -97,7 +98,7 @@ class Distances:
         self.ends = tuple(ends)
         allowed = float(clearance.margin) + TOUCH_DEPTH
         self.allowance = np.array([allowed if pair.touching else 0.0 for pair in self.pairs])
-        self.moving = frozenset(moving)
+        self.moving: Mapping[int, int] = moving
         self._measured = PairDistances(robot, geometry, moving)
         self._chosen = np.arange(len(pairs))
 
@@ -121,7 +122,7 @@ class Distances:
 
     def still(self) -> Distances:
         """The distances of pairs without obstacles that move, for configurations without times."""
-        kept = [k for k, pair in enumerate(self.ends) if not self.moving & set(pair)]
+        kept = [k for k, pair in enumerate(self.ends) if not self.moving.keys() & set(pair)]
         chosen = self.restricted(kept)
         chosen.paths = ()
         return chosen

@@ -60,7 +60,7 @@ def reach_of(robot: Robot) -> float:
     bounds = [0.0]
     for shape in convex_geometry(robot).geometryObjects:
         if shape.parentJoint != 0:
-            center, radius = _ball(Body(shape.geometry, shape.placement))
+            center, radius = ball_of(Body(shape.geometry, shape.placement))
             bounds.append(reach[shape.parentJoint] + float(np.linalg.norm(center)) + radius)
     return max(bounds)
 
@@ -69,12 +69,12 @@ def _distance_from_origin(obstacle: Obstacle) -> float:
     """Lower bound of an obstacle's distance from the world's origin; 0 if it moves."""
     if obstacle.motion is not None:
         return 0.0
-    balls = map(_ball, obstacle.bodies())
+    balls = map(ball_of, obstacle.bodies())
     return min(float(np.linalg.norm(center)) - radius for center, radius in balls)
 
 
-def _ball(body: Body) -> tuple[Array, float]:
-    """Center and radius of a ball that contains a body."""
+def ball_of(body: Body) -> tuple[Array, float]:
+    """Center and radius of a ball that contains a body, in [m]."""
     body.shape.computeLocalAABB()
     center = body.placement.act(np.asarray(body.shape.aabb_center))
     radius = float(body.shape.aabb_radius)

@@ -104,6 +104,34 @@ class ObstaclePath:
         """The pose at a time."""
         return pose_from_row(self.poses([t])[0])
 
+    def travelled(self, t: npt.ArrayLike) -> tuple[Array, Array]:
+        """Bounds of the way of its origin, in [m], and of its turn, in [rad], from its first time.
+
+        t: times (P,), in [s]. Between two times the difference bounds how far it moves. Both grow
+        evenly between the path's own times, by its largest speed there.
+        """
+        times = np.asarray(self.times)
+        grown = np.concatenate([np.zeros((1, 2)), np.cumsum(self._largest_steps, axis=0)])
+        way, angle = (np.interp(numbers_of("t", t, None), times, each) for each in grown.T)
+        return way, angle
+
+    @cached_property
+    def _largest_steps(self) -> Array:
+        """Bounds of way and turn between its times, shape (M - 1, 2).
+
+        The derivative of a cubic lies between its control points; of a rotation it is at most twice
+        that of the quaternion, relative to the quaternion's length.
+        """
+        h = np.diff(np.asarray(self.times))[:, None]
+        a, b, c, q = np.asarray(self._spline.c)
+        points = np.stack([c, c + b * h, c + 2.0 * b * h + 3.0 * a * h**2])
+        speeds = [np.linalg.norm(x, axis=2).max(axis=0) for x in (points[..., :3], points[..., 3:])]
+        shares = np.linspace(0.0, 1.0, 9)[:, None, None]
+        along = q + shares * h * (c + shares * h * (b + shares * h * a))
+        length = np.linalg.norm(along[..., 3:], axis=2).min(axis=0)
+        turns = np.where(speeds[1] == 0, 0.0, 2.0 * speeds[1] / np.maximum(length, LEAST_COSINE))
+        return np.column_stack([speeds[0], turns]) * h
+
     @cached_property
     def _spline(self) -> Any:
         """Of positions and quaternions, whose signs make neighbors close."""

@@ -9,7 +9,9 @@ from hovi.discrete.grid import DiscretePath
 from hovi.discrete.instants import InstantBatch
 from hovi.discrete.state import State
 from hovi.planning.clearance.clearance import DISTANCE_SCALE
+from hovi.planning.clearance.clearance_violation import wanted_values
 from hovi.planning.clearance.distances import Distances
+from hovi.planning.clearance.fast_obstacles import FastPairs
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.clearance_outputs import EXTRA_CLEARANCE
 from hovi.system.dataclass import dataclass
@@ -121,6 +123,7 @@ def approaches_along(
     chosen = (np.arange(len(d)) % (SAMPLES // SPREAD) == 0) & free_ones(problem, len(d))
     rows, columns = np.nonzero(chosen[:, None] & (d < least + ahead) & ~_allowed(d, least))
     lowest = _refined(problem, path, distances.restricted(pairs.tolist()), d, least + CLOSE)
+    fast = _fast(problem, path, distances, batch, q, least + CLOSE)
     wanted = ~_allowed(lowest[2], least)
     at = np.concatenate([rows / SAMPLES, lowest[0][wanted]])
     too_close = np.append(np.zeros(len(rows), dtype=bool), lowest[2][wanted] < least)
@@ -129,7 +132,37 @@ def approaches_along(
     more = _around(lowest[0][touching], lowest[1][touching], d, least + SHALLOW)
     at, too_close = np.append(at, more[0]), np.append(too_close, np.zeros(len(more[0]), dtype=bool))
     columns = np.concatenate([columns, lowest[1][wanted], more[1]])
-    return Approaches(at, pairs[columns], too_close, nearest)
+    at, numbers = np.append(at, fast[0]), np.append(pairs[columns], fast[1])
+    return Approaches(at, numbers, np.append(too_close, fast[2] < least), nearest)
+
+
+def _fast(
+    problem: TrajectoryProblem,
+    path: DiscretePath,
+    distances: Distances,
+    batch: InstantBatch,
+    q: Array,
+    below: float,
+) -> tuple[Array, Index, Array]:
+    """Where obstacles that move fast come near between samples: positions, pairs and distances.
+
+    q: configurations at the samples, with times.
+    """
+    nq = problem.coordinates.nq
+    fast = FastPairs.of(distances, batch.t, q[:, :nq])
+    if fast is None:
+        return np.zeros(0), np.zeros(0, dtype=np.intp), np.zeros(0)
+    some, grid = distances.restricted(fast.numbers.tolist()), problem.grid
+
+    def measure(t: Array, column: Index) -> Array:
+        k = np.clip(np.searchsorted(grid.t, t, side="right") - 1, 0, grid.intervals - 1)
+        s = np.clip((t - grid.t[k]) / grid.steps[k], 0.0, 1.0)
+        at = configurations(problem, path, InstantBatch(grid, k, s, np.ones(len(k))))
+        return wanted_values(some, some.at(at, t), column)
+
+    found = fast.between(some.values(q), below, measure).apart(below)
+    k = np.clip(np.searchsorted(grid.t, found.t, side="right") - 1, 0, grid.intervals - 1)
+    return k + (found.t - grid.t[k]) / grid.steps[k], fast.numbers[found.column], found.value
 
 
 def _around(at: Array, columns: Index, d: Array, below: float) -> tuple[Array, Index]:
