@@ -23,8 +23,9 @@ import hovi
 folder = Path(sys.argv[1] if len(sys.argv) > 1 else tempfile.mkdtemp())
 folder.mkdir(parents=True, exist_ok=True)
 scene = hovi.Scene(hovi.load_robot("ur5"), effects=[hovi.effects.Gravity()])
-start, goal = [0.0, -1.2, 1.2, -0.5, 0.3, 0.1], [1.2, -0.6, 0.4, 0.7, -0.8, 1.0]
-plan = hovi.plan(scene, start, goal, duration=1.5, limits="none", tolerance="0.1 mm at tool0")
+ends = [0.0, -1.2, 1.2, -0.5, 0.3, 0.1], [1.2, -0.6, 0.4, 0.7, -0.8, 1.0]
+free = {"limits": "none", "self_collision": False}
+plan = hovi.plan(scene, *ends, duration=1.5, tolerance="0.1 mm at tool0", **free)
 print(plan.message)
 assert plan.accuracy.reached
 assert plan.accuracy.estimate.largest_tip <= 1e-4
@@ -33,7 +34,7 @@ assert plan.accuracy.estimate.largest_tip <= 1e-4
 # A number is a relative tolerance of the cost. Each further digit needs a few more points.
 
 for tolerance in (1e-2, 1e-4, 1e-6, 1e-8):
-    plan = hovi.plan(scene, start, goal, duration=1.5, limits="none", tolerance=tolerance)
+    plan = hovi.plan(scene, *ends, duration=1.5, tolerance=tolerance, **free)
     last = plan.accuracy.rounds[-1]
     print(f"{tolerance:.0e}: estimate {plan.error_estimate:.1e}, {last.points} points")
     assert plan.error_estimate <= tolerance

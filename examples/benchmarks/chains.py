@@ -32,7 +32,9 @@ def measure(links: int, setting: str, time_limit: float) -> list[str]:
     options = SETTINGS[setting] | {"processes": 1, "time_limit": time_limit}
 
     def plan(limits: object) -> hovi.Solution:
-        return hovi.plan(scene, start, goal, DURATION, limits=limits, **options)
+        return hovi.plan(
+            scene, start, goal, DURATION, limits=limits, self_collision=False, **options
+        )
 
     hovi.plan(scene, start, start + 0.01, 1.0, limits={"base": "none", "v": 1.0}, intervals=4)
     seconds, free = timed(lambda: plan("none"))

@@ -45,7 +45,8 @@ def plans() -> Iterator[None]:
             scene.robot.integrate(middle, random.uniform(-0.3, 0.3, scene.robot.nv))
             for _ in range(2)
         )
-        hovi.plan(scene, start, goal, 1.5, limits=limits, time_limit=5.0)
+        options = {"limits": limits, "self_collision": False}
+        hovi.plan(scene, start, goal, 1.5, time_limit=5.0, **options)
         number += 1
         yield
 

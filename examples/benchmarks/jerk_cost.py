@@ -159,9 +159,9 @@ def moved(number: int, seed: int) -> dict[str, object]:
     scene = hovi.Scene(robot, [hovi.effects.Gravity(), payload])
     limits = as_limits(robot, LIMITS, order=3)
     start, goal, T = _draw(scene, limits, np.random.default_rng([seed, number]))
-    hovi.plan(scene, start, start + 0.01, 1.0, limits=limits, smooth=True)
+    hovi.plan(scene, start, start + 0.01, 1.0, limits=limits, smooth=True, self_collision=False)
     began = time.perf_counter()
-    found = hovi.plan(scene, start, goal, T, limits=limits, smooth=True)
+    found = hovi.plan(scene, start, goal, T, limits=limits, smooth=True, self_collision=False)
     seconds = time.perf_counter() - began
     motion = found.trajectory
     assert motion.scene is not None
@@ -210,7 +210,7 @@ def weights() -> None:
     rows = []
     for name, scene, limits in plans:
         began = time.perf_counter()
-        found = hovi.plan(scene, *ends, task.duration, limits=limits)
+        found = hovi.plan(scene, *ends, task.duration, limits=limits, self_collision=False)
         seconds = time.perf_counter() - began
         largest = hovi.extremes(found.trajectory)
         t = np.linspace(0.0, task.duration, 5_001)

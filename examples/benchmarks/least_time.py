@@ -47,6 +47,7 @@ def measure(name: str) -> list[float]:
         *(scene, start, goal, (0.1, 3.0)),
         **{"time_weight": 1.0, "intervals": INTERVALS, "processes": 1, "time_limit": TIME_LIMIT},
         limits={"base": "none", "v": v, "tau": tau},
+        self_collision=False,
     )
     seconds = time.perf_counter() - began
     path = _path(found.trajectory)

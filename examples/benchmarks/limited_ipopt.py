@@ -142,7 +142,9 @@ def compare(arm: str, armature: float, count: int, seed: int, folder: str) -> li
 
         def plan(reach=reach, **options: object) -> tuple[float, hovi.Solution]:
             ends = reach.start, reach.goal, reach.duration
-            return timed(lambda: hovi.plan(scene, *ends, processes=1, **options))
+            return timed(
+                lambda: hovi.plan(scene, *ends, processes=1, self_collision=False, **options)
+            )
 
         plans = {"16 intervals": plan(intervals=16)}
         own = plans["16 intervals"][1].trajectory.grid.schemes[0]

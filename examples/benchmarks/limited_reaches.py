@@ -35,7 +35,8 @@ from random_arms import (
 
 import hovi
 
-SETTINGS = {"16 intervals": {"intervals": 16}, "defaults": {}}
+APART = {"self_collision": False}
+SETTINGS = {"16 intervals": {"intervals": 16, **APART}, "defaults": APART}
 MAX_EXCESS = 1e-6
 """Largest excess of a motion that holds its limits, as a share of their ranges."""
 
@@ -67,7 +68,7 @@ def measure(arm: str, armature: float, count: int, seed: int, time_limit: float)
     """Every reach of an arm with every setting, after a plan that loads everything."""
     scene = arm_scene(arm, armature)
     reaches = random_reaches(scene, count, seed)
-    hovi.plan(scene, reaches[0].start, reaches[0].start + 0.01, 1.0, intervals=16)
+    hovi.plan(scene, reaches[0].start, reaches[0].start + 0.01, 1.0, intervals=16, **APART)
     rows = []
     for number, reach in enumerate(reaches):
         for setting, options in SETTINGS.items():

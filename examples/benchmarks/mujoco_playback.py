@@ -19,7 +19,7 @@ def motion_of(name: str, rotors: float) -> hovi.Trajectory:
     scene = hovi.Scene(robot, [hovi.effects.Gravity(), hovi.effects.Armature(rotors)])
     start = np.clip(robot.neutral(), robot.lower + 0.1, robot.upper - 0.1)
     goal = np.clip(start + 0.5, robot.lower + 0.1, robot.upper - 0.1)
-    return hovi.plan(scene, start, goal, 1.5).trajectory
+    return hovi.plan(scene, start, goal, 1.5, self_collision=False).trajectory
 
 
 def main() -> None:

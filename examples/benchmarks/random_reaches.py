@@ -51,7 +51,7 @@ def measure(name: str) -> list[dict[str, object]]:
     scene = hovi.Scene(hovi.load_robot(name, locked=ROBOTS[name]), [hovi.effects.Gravity()])
     rows: list[dict[str, object]] = []
     for number, (start, goal, duration) in enumerate(pairs(scene)):
-        settings = {"limits": "urdf", "processes": 1, "time_limit": TIME_LIMIT}
+        settings = {"self_collision": False, "processes": 1, "time_limit": TIME_LIMIT}
         first = hovi.plan(scene, start, goal, duration, **settings)
         row = {"number": number, "solution": _result(first), "again": None}
         if not first.success:

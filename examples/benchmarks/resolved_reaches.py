@@ -46,6 +46,7 @@ ARMS = {
 HOLDING_SHARE = 0.9
 """Largest torque that holds a start or goal, as a share of its limit."""
 TIME_LIMIT = 600.0
+COMMON = {"self_collision": False, "time_limit": TIME_LIMIT, "processes": 1}
 """Time limit of a plan, in [s]."""
 MAX_DIFFERENCE = 1e-2
 """Largest relative difference of costs of a success that is not denied."""
@@ -192,7 +193,7 @@ def measure(arm: str, limits: str, number: int, count: int, seed: int) -> Reach:
     scene = load(arm)
     *ends, T = reaches(scene, count, seed)[number]
     began = time.process_time()
-    plan = hovi.plan(scene, *ends, T, limits=limits, time_limit=TIME_LIMIT, processes=1)
+    plan = hovi.plan(scene, *ends, T, limits=limits, **COMMON)
     seconds = time.process_time() - began
     denied = denial(scene, limits, plan) if plan.success else ""
     velocity = np.abs(plan.trajectory.sample(np.linspace(0, T, 2001)).v).max(axis=0)

@@ -32,7 +32,7 @@ def main() -> None:
         scene = hovi.Scene(hovi.load_robot(name, locked=locked), [hovi.effects.Gravity()])
         start = scene.robot.neutral()
         goal = scene.robot.space.integrate(start, np.full(scene.robot.nv, 0.4))
-        motion = hovi.plan(scene, start, goal, 2.0, limits="none").trajectory
+        motion = hovi.plan(scene, start, goal, 2.0, limits="none", self_collision=False).trajectory
         q, v, a, _ = motion.sample(0.7)
         calls = (
             partial(motion.sample, 0.7),

@@ -57,7 +57,9 @@ def measure(name: str) -> tuple[list[list[str]], str]:
     scene, start, goal, duration = task(name)
 
     def plan(**options: object) -> hovi.Solution:
-        return hovi.plan(scene, start, goal, duration, limits="none", **options)
+        return hovi.plan(
+            scene, start, goal, duration, limits="none", self_collision=False, **options
+        )
 
     def on_grid(r: int, N: int) -> hovi.Solution:
         """A solve on a fixed grid, without the estimate that a plan has."""

@@ -66,7 +66,11 @@ def measure(arm: str, limits: str, count: int, seed: int) -> list[Claim]:
             goal = scene.robot.integrate(start, 0.5 * scene.robot.difference(start, goal))
         for tolerance in TOLERANCES:
             plan = hovi.plan(
-                scene, start, goal, T, limits=limits, tolerance=tolerance, time_limit=TIME_LIMIT
+                *(scene, start, goal, T),
+                limits=limits,
+                tolerance=tolerance,
+                time_limit=TIME_LIMIT,
+                self_collision=False,
             )
             reached = plan.accuracy is not None and plan.accuracy.reached
             true = _true_error(plan) if plan.success else np.nan

@@ -18,7 +18,9 @@ from oracles.pontryagin_oracle import extremal
 
 def resolved(scene: str) -> tuple[ResolvedMotion, Solution]:
     task = load_task(example(scene))
-    found = plan(task.scene, task.start, task.goal, task.duration, limits="none")
+    found = plan(
+        task.scene, task.start, task.goal, task.duration, limits="none", self_collision=False
+    )
     assert found.problem is not None
     return resolve(found.problem, found, Budget(600.0)), found
 

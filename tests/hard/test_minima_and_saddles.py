@@ -68,7 +68,14 @@ def stationary(solutions: Sequence[Solution]) -> Outcome:
 def planned(scene: Scene, goal: Any, duration: float, **options: Any) -> Solution:
     """Plan from hanging, without limits, in one process."""
     start = hanging(scene)
-    return plan(scene, start, goal, duration, **({"limits": "none", "processes": 1} | options))
+    return plan(
+        scene,
+        start,
+        goal,
+        duration,
+        **({"limits": "none", "processes": 1} | options),
+        self_collision=False,
+    )
 
 
 def naive_runs(goal: np.ndarray, cases: Sequence[tuple[float, int]]) -> Callable[[], str]:
@@ -124,14 +131,19 @@ def paper_swing_up() -> Outcome:
 
 def naive_ur5() -> str:
     task = load_task(example("ur5_reach"))
-    found = plan(task.scene, task.start, task.goal, task.duration, limits="none")
+    found = plan(
+        task.scene, task.start, task.goal, task.duration, limits="none", self_collision=False
+    )
     return f"the cubic guess leads to J = {found.cost:.2f}"
 
 
 def ur5_reach() -> Outcome:
     task = load_task(example("ur5_reach"))
     options: dict[str, Any] = {"limits": "none", "starts": 32, "processes": 1}
-    return minima([plan(task.scene, task.start, task.goal, task.duration, **options)], 56.15)
+    return minima(
+        [plan(task.scene, task.start, task.goal, task.duration, **options, self_collision=False)],
+        56.15,
+    )
 
 
 def turns(
@@ -247,7 +259,7 @@ def weak_motor() -> Outcome:
     limits = {"base": "none", "tau": 2.0, "q": [[-0.05, 0.05], [-0.05, 0.05]]}
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "holding the robot still", HoviWarning)
-        found = plan(arm(), [0.0, 0.0], [0.0, 0.0], 2.0, limits=limits)
+        found = plan(arm(), [0.0, 0.0], [0.0, 0.0], 2.0, limits=limits, self_collision=False)
     named = all(word in found.message for word in ("shoulder", "torque", "at t = "))
     return Outcome(
         f"{found.status}: {found.message[:160]}", found.status is Status.INFEASIBLE and named

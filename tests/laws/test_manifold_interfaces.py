@@ -64,11 +64,11 @@ def test_limits_hold_for_continuous_joints(kinova: Robot) -> None:
     scene = Scene(kinova, [Gravity(), Armature(0.1)])
     q0 = kinova.integrate(kinova.neutral(), np.array([0.0, 2.5, 2.0, 0.0, 1.0, 0.0]))
     q1 = kinova.integrate(q0, np.array([1.5, 0.4, -0.5, 2.0, 0.5, -2.5]))
-    solution = plan(scene, q0, q1, 5.0, intervals=14)
+    solution = plan(scene, q0, q1, 5.0, intervals=14, self_collision=False)
     assert solution.success, solution.message
     limits = as_limits(kinova, "urdf")
     assert excess_along(solution.trajectory, limits).worst <= limits.tolerance
-    free = plan(scene, q0, q1, 5.0, intervals=14, limits="none")
+    free = plan(scene, q0, q1, 5.0, intervals=14, limits="none", self_collision=False)
     assert excess_along(free.trajectory, limits).worst > 0.01
     assert solution.cost > free.cost
 
@@ -146,7 +146,9 @@ def test_several_starts_try_different_turns(kinova: Robot) -> None:
     scene = Scene(kinova, [Gravity(), Armature(0.1)])
     q0 = kinova.integrate(kinova.neutral(), np.array([0.0, 2.5, 2.0, 0.0, 1.0, 0.0]))
     q1 = kinova.integrate(q0, np.array([0.5, 0.2, 0.1, 0.5, 0.2, 3.0]))
-    solution = plan(scene, q0, q1, 2.0, intervals=6, limits="none", starts=6, processes=1)
+    solution = plan(
+        scene, q0, q1, 2.0, intervals=6, limits="none", starts=6, processes=1, self_collision=False
+    )
     assert solution.success
     assert len(solution.minima) > 1
 
@@ -159,7 +161,15 @@ def test_a_full_rotation_needs_enough_intervals_for_its_charts() -> None:
     with pytest.raises(ChartError, match=r"rotates joint 'j0' by .* use \d+ or more intervals"):
         guess_path(TrajectoryProblem(ld, State(q), goal), "cubic")
     solution = plan(
-        Scene(robot), q, goal, 2.0, intervals=4, limits="none", max_iterations=1, continuation=False
+        Scene(robot),
+        q,
+        goal,
+        2.0,
+        intervals=4,
+        limits="none",
+        max_iterations=1,
+        continuation=False,
+        self_collision=False,
     )
     assert solution.trajectory.grid.intervals == 4
     shown = unwrapped(robot.space, solution.trajectory.configurations(np.linspace(0, 2, 200)))
@@ -268,7 +278,9 @@ def test_a_wrong_length_lists_joints_with_several_coordinates() -> None:
 def test_tables_and_reports_give_angles_of_continuous_joints(kinova: Robot, tmp_path: Path) -> None:
     start, goal = kinova.neutral(), kinova.neutral()
     goal[:2] = np.cos(1.2), np.sin(1.2)
-    motion = plan(Scene(kinova, [Armature(0.1)]), start, goal, 2.0, intervals=8).trajectory
+    motion = plan(
+        Scene(kinova, [Armature(0.1)]), start, goal, 2.0, intervals=8, self_collision=False
+    ).trajectory
     found = peaks(motion)
     assert found.q_high[0] == pytest.approx(1.2, abs=1e-2)
     assert np.isfinite([found.q_low, found.q_high]).all()

@@ -218,7 +218,15 @@ def test_replayed_torques_of_the_panda_with_gripper_follow_the_plan(tmp_path: Pa
     robot = load_robot("panda", mimic=True)
     start = robot.pose("default")
     goal = start + np.array([0.5, -0.4, 0.3, 0.6, -0.2, 0.4, 0.5, 0.03])
-    solution = plan(Scene(robot, [Gravity()]), start, goal, 1.5, limits="none", intervals=8)
+    solution = plan(
+        Scene(robot, [Gravity()]),
+        start,
+        goal,
+        1.5,
+        limits="none",
+        intervals=8,
+        self_collision=False,
+    )
     assert solution.n_neg == 0
     replayed = replay_dynamics(solution.trajectory)
     assert max(replayed.angle, replayed.slide, replayed.largest_tip) < 1e-7
@@ -416,7 +424,9 @@ def test_the_command_lists_followers(capsys: pytest.CaptureFixture[str]) -> None
 def test_followers_are_highlighted_with_their_leader(tmp_path: Path) -> None:
     robot = loaded(tmp_path, two_fingers(mimic("b", -2.0, 0.3)))
     limits = {"v": {"b": 1.2}}
-    motion = plan(Scene(robot, [Gravity()]), [0.0], [1.0], 1.0, limits=limits).trajectory
+    motion = plan(
+        Scene(robot, [Gravity()]), [0.0], [1.0], 1.0, limits=limits, self_collision=False
+    ).trajectory
     shown = Highlights.of(motion, robot, np.linspace(0.0, 1.0, 200))
     assert shown is not None
     flags = {name: shown.flags[:, robot.model.getJointId(name)] for name in "ab"}

@@ -29,7 +29,13 @@ needs_jupyter = pytest.mark.skipif(
 @pytest.fixture(scope="module")
 def solution() -> hovi.Solution:
     scene = hovi.Scene(hovi.load_robot("ur5"), [hovi.effects.Gravity()])
-    return hovi.plan(scene, [0, -1.2, 1.2, -1.5, -1.5, 0], [1, -1, 1.4, -1.2, -1.5, 0.5], 1.0)
+    return hovi.plan(
+        scene,
+        [0, -1.2, 1.2, -1.5, -1.5, 0],
+        [1, -1, 1.4, -1.2, -1.5, 0.5],
+        1.0,
+        self_collision=False,
+    )
 
 
 @pytest.fixture(scope="module")

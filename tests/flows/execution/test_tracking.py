@@ -46,7 +46,9 @@ def rich(two_link: Robot) -> Scene:
 
 @pytest.fixture(scope="module")
 def planned(simple: Scene) -> Trajectory:
-    return plan(simple, START, GOAL, 1.0, intervals=32, limits="none").trajectory
+    return plan(
+        simple, START, GOAL, 1.0, intervals=32, limits="none", self_collision=False
+    ).trajectory
 
 
 def by_scipy(tracking: Tracking) -> Array:
@@ -234,7 +236,7 @@ def test_the_command_refuses_in_one_sentence(
 def test_of_several_tips_the_one_with_the_largest_deviation_is_reported(two_arms: Robot) -> None:
     scene = Scene(two_arms, [Gravity()])
     ends = State(two_arms.neutral()), State(two_arms.neutral() + 0.2)
-    motion = plan(scene, *ends, 0.5, limits="none").trajectory
+    motion = plan(scene, *ends, 0.5, limits="none", self_collision=False).trajectory
     pushed = Scene(two_arms, [Gravity(), Wrench("right_gripper", (0.0, 0.0, 5.0))])
     distance = play(pushed, motion).tip_distance
     assert distance.frames == ("left_gripper", "right_gripper")
@@ -270,7 +272,7 @@ def test_passive_joints_get_no_torque(models: Path) -> None:
 
 
 def test_a_solution_is_not_accepted_as_a_trajectory(simple: Scene) -> None:
-    solution = plan(simple, START, GOAL, 1.0)
+    solution = plan(simple, START, GOAL, 1.0, self_collision=False)
     with pytest.raises(InputError, match="expected a Trajectory, got a Solution; give the traj"):
         play(simple, solution)  # type: ignore[arg-type]
     with pytest.raises(InputError, match="expected a Solution, got a Trajectory; give what"):

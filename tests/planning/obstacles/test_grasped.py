@@ -120,7 +120,16 @@ TABLE = hovi.Box([0.6, 0.6, 0.1], UNDER_BOX, name="table")
 def lift(scene: hovi.Scene, grasped: hovi.Grasped) -> hovi.Solution:
     """Lifts the box from the table on which it stands."""
     options = {"limits": "none", "scheme": "galerkin-2x8", "intervals": 8, "margin": 0.05}
-    return hovi.plan(scene, START, GOAL, 1.0, obstacles=[TABLE], grasped=[grasped], **options)
+    return hovi.plan(
+        scene,
+        START,
+        GOAL,
+        1.0,
+        obstacles=[TABLE],
+        grasped=[grasped],
+        **options,
+        self_collision=False,
+    )
 
 
 def test_what_stands_on_a_table_is_lifted_where_it_may_touch_it(arm_scene: hovi.Scene) -> None:

@@ -138,7 +138,7 @@ CROSSING = {"times": [0.0, 1.5], "positions": [[2.1, 0.0, -2.2], [-0.9, 0.0, 1.4
 
 def reach(scene: hovi.Scene, *obstacles: Obstacle, **options: Any) -> hovi.Solution:
     given = {"limits": "none", "margin": 0.05, **options}
-    return hovi.plan(scene, HANG, REACH, 1.5, obstacles=obstacles, **given)
+    return hovi.plan(scene, HANG, REACH, 1.5, obstacles=obstacles, **given, self_collision=False)
 
 
 def crossing(path: object = CROSSING) -> hovi.Sphere:

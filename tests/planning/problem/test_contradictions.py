@@ -18,7 +18,7 @@ from hovi.schemes import galerkin
 
 
 def planned(scene: Scene, start: list[float], goal: list[float], T: float, **limits: Any) -> Any:
-    return hovi.plan(scene, start, goal, T, limits={"base": "none", **limits})
+    return hovi.plan(scene, start, goal, T, limits={"base": "none", **limits}, self_collision=False)
 
 
 def test_a_start_outside_names_end_joint_and_limits(arm_scene: Scene) -> None:
@@ -100,5 +100,7 @@ def test_a_link_in_an_obstacle_leaves_the_obstacle_to_move(ur5: hovi.Robot, end:
     states = {"start": np.full(6, 0.5), "goal": np.full(6, 0.5)}
     states[end] = np.zeros(6)
     ball = hovi.Sphere([0.8, 0.19, 0.0], 0.1, name="ball")
-    solution = hovi.plan(hovi.Scene(ur5), *states.values(), 3.0, obstacles=[ball])
+    solution = hovi.plan(
+        hovi.Scene(ur5), *states.values(), 3.0, obstacles=[ball], self_collision=False
+    )
     assert f"; change the {end} or move the obstacle. " in solution.message

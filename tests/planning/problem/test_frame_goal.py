@@ -153,7 +153,9 @@ def test_a_goal_of_a_frame_that_does_not_move_is_refused(ur5: Robot) -> None:
     fixed = FrameGoal("base", position=[0.0, 0.0, 0.1])
     sentence = r"frame 'base' of robot 'ur5' is fixed to the world.*one that moves is 'tool0'\.$"
     with pytest.raises(InputError, match=sentence):
-        hovi.plan(scene, start, fixed, 1.0)
+        hovi.plan(scene, start, fixed, 1.0, self_collision=False)
     above = hovi.Via(0.5, fixed)
     with pytest.raises(InputError, match=sentence):
-        hovi.plan(scene, start, hovi.State(ur5.neutral() + 0.3), 1.0, via=[above])
+        hovi.plan(
+            scene, start, hovi.State(ur5.neutral() + 0.3), 1.0, via=[above], self_collision=False
+        )

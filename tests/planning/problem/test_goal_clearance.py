@@ -68,7 +68,15 @@ def test_a_goal_in_a_ball_is_infeasible_at_once(
     scene = hovi.Scene(ur5, [hovi.effects.Gravity()])
     inside = FrameGoal("tool0", position=[0.45, 0.25, 0.25], **turned)
     ends = {"goal": inside} if what == "goal" else {"goal": START, "via": [hovi.Via(1.0, inside)]}
-    found = hovi.plan(scene, START, duration=2.0, obstacles=OBSTACLES[:1], limits="none", **ends)
+    found = hovi.plan(
+        scene,
+        START,
+        duration=2.0,
+        obstacles=OBSTACLES[:1],
+        limits="none",
+        **ends,
+        self_collision=False,
+    )
     assert (found.status, found.nit) == (Status.INFEASIBLE, 0)
     assert f"with frame 'tool0' at the {what}, link 'wrist_3_link' and obstacle" in found.message
     assert "'ball' overlap by 0.0495 m or come closer" in found.message

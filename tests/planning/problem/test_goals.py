@@ -36,7 +36,9 @@ def test_a_pose_goal_is_met_and_costs_no_more_than_its_joint_goal(
     robot, wanted = task.scene.robot, at_goal(task, frame)
     goal = hovi.FrameGoal(frame, wanted)
     grid = {"intervals": 48} if limits == "none" else {}
-    solution = hovi.plan(task.scene, task.start, goal, 2.5, limits=limits, **grid)
+    solution = hovi.plan(
+        task.scene, task.start, goal, 2.5, limits=limits, **grid, self_collision=False
+    )
     assert solution.n_neg == 0, solution.message
     end = solution.trajectory.q[-1]
     error = pin.log6(placement(robot, frame, end).actInv(wanted)).vector
@@ -44,16 +46,31 @@ def test_a_pose_goal_is_met_and_costs_no_more_than_its_joint_goal(
     np.testing.assert_array_equal(solution.trajectory.v[-1], 0.0)
     if limits == "none":
         guess = solution.trajectory
-        same = hovi.plan(task.scene, task.start, end, 2.5, limits=limits, guess=guess, **grid)
+        same = hovi.plan(
+            task.scene,
+            task.start,
+            end,
+            2.5,
+            limits=limits,
+            guess=guess,
+            **grid,
+            self_collision=False,
+        )
         assert solution.cost <= same.cost * (1 + 1e-9)
 
 
 def test_a_position_goal_costs_less_than_the_pose_that_fixes_more() -> None:
     task = hovi.load_task(hovi.example("ur5_reach"))
     wanted = at_goal(task, "tool0")
-    pose = hovi.plan(task.scene, task.start, hovi.FrameGoal("tool0", wanted), 2.5)
+    pose = hovi.plan(
+        task.scene, task.start, hovi.FrameGoal("tool0", wanted), 2.5, self_collision=False
+    )
     position = hovi.plan(
-        task.scene, task.start, hovi.FrameGoal("tool0", position=wanted.translation), 2.5
+        task.scene,
+        task.start,
+        hovi.FrameGoal("tool0", position=wanted.translation),
+        2.5,
+        self_collision=False,
     )
     axis = hovi.plan(
         task.scene,
@@ -62,6 +79,7 @@ def test_a_position_goal_costs_less_than_the_pose_that_fixes_more() -> None:
             "tool0", position=wanted.translation, axis=([0, 0, 1], wanted.rotation[:, 2])
         ),
         2.5,
+        self_collision=False,
     )
     assert position.cost < axis.cost < pose.cost
 
@@ -125,12 +143,22 @@ def test_via_points_are_passed_in_joints_and_in_space() -> None:
         hovi.Via(0.8, hovi.State([0.4, -1.4, 1.0, -0.5, 0.0, 0.0], free=["wrist_3_joint"])),
     ]
     rotors = hovi.Scene(robot, [hovi.effects.Gravity(), hovi.effects.Armature(0.1)])
-    solution = hovi.plan(rotors, task.start, task.goal, 2.5, via=vias, limits="none")
+    solution = hovi.plan(
+        rotors, task.start, task.goal, 2.5, via=vias, limits="none", self_collision=False
+    )
     assert solution.success, solution.message
     passed = solution.trajectory.sample([0.8, 1.7])
     np.testing.assert_allclose(passed.q[0, :5], [0.4, -1.4, 1.0, -0.5, 0.0], atol=1e-9)
     np.testing.assert_allclose(placement(robot, "tool0", passed.q[1]).translation, above, atol=1e-9)
-    direct = hovi.plan(rotors, task.start, task.goal, 2.5, limits="none", guess=solution.trajectory)
+    direct = hovi.plan(
+        rotors,
+        task.start,
+        task.goal,
+        2.5,
+        limits="none",
+        guess=solution.trajectory,
+        self_collision=False,
+    )
     assert direct.cost < solution.cost
 
 
@@ -138,12 +166,14 @@ def test_unreachable_goals_and_via_points_are_infeasible_with_the_reason() -> No
     task = hovi.load_task(hovi.example("ur5_reach"))
     far = hovi.FrameGoal("tool0", position=[2.0, 0.0, 0.5])
     for limits in ("none", "urdf"):
-        solution = hovi.plan(task.scene, task.start, far, 2.0, limits=limits)
+        solution = hovi.plan(task.scene, task.start, far, 2.0, limits=limits, self_collision=False)
         assert solution.status is hovi.Status.INFEASIBLE
         assert "that reaches the goal was found" in solution.message
         assert "frame 'tool0' misses it by" in solution.message
     via = hovi.Via(1.0, far)
-    solution = hovi.plan(task.scene, task.start, task.goal, 2.0, via=[via], limits="none")
+    solution = hovi.plan(
+        task.scene, task.start, task.goal, 2.0, via=[via], limits="none", self_collision=False
+    )
     assert solution.status is hovi.Status.INFEASIBLE
     assert not solution.success
     assert "that reaches the via point at 1 s was found" in solution.message
@@ -155,7 +185,7 @@ def test_replanning_to_a_goal_turned_by_half_a_turn_turns_the_hand() -> None:
     pose = at_goal(task, "tool0")
     goal = hovi.FrameGoal("tool0", pose)
     rotors = hovi.Scene(task.scene.robot, [hovi.effects.Gravity(), hovi.effects.Armature(0.1)])
-    first = hovi.plan(rotors, task.start, goal, 2.5, limits="none")
+    first = hovi.plan(rotors, task.start, goal, 2.5, limits="none", self_collision=False)
     turned = pose.rotation @ np.diag([-1.0, -1.0, 1.0])
     again = first.replan(goal=hovi.FrameGoal("tool0", position=pose.translation, rotation=turned))
     assert again.success, again.message
@@ -189,11 +219,15 @@ def test_bad_goals_and_via_points_are_refused() -> None:
     task = hovi.load_task(hovi.example("ur5_reach"))
     scene, start, goal = task.scene, task.start, task.goal
     with pytest.raises(InputError, match="no frame 'tool9'"):
-        hovi.plan(scene, start, hovi.FrameGoal("tool9", position=[0, 0, 1]), 1.0)
+        hovi.plan(
+            scene, start, hovi.FrameGoal("tool9", position=[0, 0, 1]), 1.0, self_collision=False
+        )
     with pytest.raises(InputError, match="did you mean 'elbow_joint'"):
-        hovi.plan(scene, start, hovi.State(goal.q, free=["elbow_joints"]), 1.0)
+        hovi.plan(
+            scene, start, hovi.State(goal.q, free=["elbow_joints"]), 1.0, self_collision=False
+        )
     with pytest.raises(InputError, match="is not inside the motion of 1 s"):
-        hovi.plan(scene, start, goal, 1.0, via=[hovi.Via(1.5, goal)])
+        hovi.plan(scene, start, goal, 1.0, via=[hovi.Via(1.5, goal)], self_collision=False)
     with pytest.raises(InputError, match="must be positive"):
         hovi.Via(-1.0, goal)
     with pytest.raises(InputError, match=r"must be a hovi.State.q. or a hovi.FrameGoal"):
@@ -298,7 +332,9 @@ def test_one_unreachable_via_point_of_two_is_enough(far: int) -> None:
     goals = [near, near]
     goals[far] = hovi.FrameGoal("tool0", position=[5.0, 0.0, 0.0])
     vias = [hovi.Via(t, goal) for t, goal in zip((0.5, 1.0), goals, strict=True)]
-    solution = hovi.plan(task.scene, task.start, task.goal, 2.0, via=vias, limits="none")
+    solution = hovi.plan(
+        task.scene, task.start, task.goal, 2.0, via=vias, limits="none", self_collision=False
+    )
     assert solution.status is hovi.Status.INFEASIBLE
     assert solution.nit == 0
     assert f"the via point at {0.5 if far == 0 else 1:g} s" in solution.message
@@ -309,5 +345,10 @@ def test_a_via_point_at_a_frame_that_the_robot_does_not_have_is_refused() -> Non
     via = [hovi.Via(0.8, hovi.FrameGoal("tol0", position=[0.5, 0.1, 0.5]))]
     with pytest.raises(InputError, match="has no frame 'tol0': did you mean 'tool0'"):
         hovi.plan(
-            scene, [0.0, -1.4, 1.6, -0.2, 0.5, 0.0], [1.0, -1.0, 1.2, -0.2, 0.9, 0.3], 1.5, via=via
+            scene,
+            [0.0, -1.4, 1.6, -0.2, 0.5, 0.0],
+            [1.0, -1.0, 1.2, -0.2, 0.9, 0.3],
+            1.5,
+            via=via,
+            self_collision=False,
         )

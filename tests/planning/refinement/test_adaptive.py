@@ -40,7 +40,9 @@ def task(request: pytest.FixtureRequest) -> Task:
 
 def planned(task: Task, tolerance: float | str, **options: object) -> Solution:
     ends = task.start, task.goal, task.duration
-    return plan(task.scene, *ends, tolerance=tolerance, limits="none", **options)  # type: ignore[arg-type]
+    return plan(
+        task.scene, *ends, tolerance=tolerance, limits="none", **options, self_collision=False
+    )  # type: ignore[arg-type]
 
 
 def accuracy_of(solution: Solution) -> Accuracy:

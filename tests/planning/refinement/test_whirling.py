@@ -24,7 +24,7 @@ def xarm() -> hovi.Scene:
 
 
 def test_a_whirling_wrist_is_named_with_its_inertia(xarm: hovi.Scene) -> None:
-    found = hovi.plan(xarm, *XARM_REACH, limits="none")
+    found = hovi.plan(xarm, *XARM_REACH, limits="none", self_collision=False)
     assert found.status is hovi.Status.UNRESOLVED
     named = re.search(
         r"joint '(\S+)' whirls at up to (\S+) rad/s with an inertia of (\S+) kg", found.message
@@ -46,7 +46,7 @@ def test_each_remedy_helps(xarm: hovi.Scene) -> None:
     rotors = hovi.Scene(robot, [gravity, hovi.effects.Armature(0.1)])
     smooth = hovi.Scene(robot, [gravity, hovi.effects.AccelerationCost(0.05)])
     for scene, limits in ((xarm, "urdf"), (rotors, "none"), (smooth, "none")):
-        found = hovi.plan(scene, *XARM_REACH, limits=limits)
+        found = hovi.plan(scene, *XARM_REACH, limits=limits, self_collision=False)
         assert found.success, found.message
 
 
@@ -62,7 +62,9 @@ def test_a_whirling_motion_that_a_finer_grid_leaves_is_no_minimum() -> None:
     robot = hovi.load_robot("talos_arm", locked=["gripper_left_joint"])
     scene = hovi.Scene(robot, [hovi.effects.Gravity()])
     start, goal = [1.82, 0.43, -1.69, -1.36, 0.09, -0.62], [0.48, 1.02, -0.76, -2.39, -0.94, 0.16]
-    found = hovi.plan(scene, start, goal, 1.23, limits="none", processes=1, tolerance=0.03)
+    found = hovi.plan(
+        scene, start, goal, 1.23, limits="none", processes=1, tolerance=0.03, self_collision=False
+    )
     assert found.problem is not None
     quarters = found.problem.on(found.problem.grid.halved().halved())
     finer = solve_on_grid(quarters, found.trajectory)
@@ -78,7 +80,9 @@ def whirling_z1() -> hovi.Solution:
     scene = hovi.Scene(hovi.load_robot("z1", locked=["jointGripper"]), [hovi.effects.Gravity()])
     start = [0.06222511, 1.94983376, -0.15340647, 1.26122452, 0.59194828, -2.10693647]
     goal = [2.14330674, 2.11635047, -1.8623539, -0.84617339, 1.11296258, 1.76312911]
-    return hovi.plan(scene, start, goal, 2.47673118403244, limits="none", processes=1)
+    return hovi.plan(
+        scene, start, goal, 2.47673118403244, limits="none", processes=1, self_collision=False
+    )
 
 
 def test_a_later_grid_that_is_left_unfinished_refutes_an_estimate(
@@ -112,7 +116,9 @@ def test_a_fast_whirling_motion_needs_a_minimum_on_two_finer_grids(
 def test_a_fast_whirling_motion_that_finer_grids_confirm_is_a_minimum() -> None:
     scene = hovi.Scene(hovi.load_robot("ur5"), [hovi.effects.Gravity()])
     start, goal, duration = UR5_REACH
-    found = hovi.plan(scene, start, goal, duration, limits="none", processes=1)
+    found = hovi.plan(
+        scene, start, goal, duration, limits="none", processes=1, self_collision=False
+    )
     assert found.success, found.message
     whirling = whirl(found)
     assert whirling is not None
@@ -126,7 +132,9 @@ def test_a_motion_that_finer_grids_move_ever_further_is_no_minimum() -> None:
     start = [-2.07511832, 0.34060844, 0.34505737, 0.72300065, 1.97343618, -2.57173197]
     goal = [-2.09247888, -0.85894251, -2.42605944, -3.01370346, 2.55865486, 1.94229937]
     options = {"limits": "none", "processes": 1}
-    found = hovi.plan(scene, start, goal, 4.190286081291065, tolerance=0.02, **options)
+    found = hovi.plan(
+        scene, start, goal, 4.190286081291065, tolerance=0.02, **options, self_collision=False
+    )
     assert whirl(found) is None
     assert found.status is hovi.Status.UNRESOLVED, found.message
     assert "and a still finer one does not confirm that" in found.message
@@ -135,4 +143,4 @@ def test_a_motion_that_finer_grids_move_ever_further_is_no_minimum() -> None:
     finer = solve_on_grid(quarters, found.trajectory)
     assert finer.success
     assert finer.cost < 0.99 * found.cost
-    assert hovi.plan(scene, start, goal, 4.190286081291065, **options).success
+    assert hovi.plan(scene, start, goal, 4.190286081291065, **options, self_collision=False).success

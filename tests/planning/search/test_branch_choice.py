@@ -32,9 +32,11 @@ def test_the_branch_with_the_cheapest_motion_is_chosen(ur5: Robot, scene: hovi.S
     costs = []
     for branch in branches:
         alone = dataclasses.replace(goal, guess=branch)
-        motion = hovi.plan(scene, start, alone, 1.5, continuation=False, **FAST)
+        motion = hovi.plan(
+            scene, start, alone, 1.5, continuation=False, **FAST, self_collision=False
+        )
         costs.append(motion.cost if motion.success else np.inf)
-    chosen = hovi.plan(scene, start, goal, 1.5, continuation=False, **FAST)
+    chosen = hovi.plan(scene, start, goal, 1.5, continuation=False, **FAST, self_collision=False)
     assert np.argmin(costs) != 0
     assert chosen.cost == pytest.approx(min(costs), rel=1e-9)
 
@@ -42,7 +44,7 @@ def test_the_branch_with_the_cheapest_motion_is_chosen(ur5: Robot, scene: hovi.S
 def test_a_motion_begins_and_ends_at_frames(ur5: Robot, scene: hovi.Scene) -> None:
     poses = ur5.frame_pose("tool0", np.array([[0.3, -1.2, 1.3, -0.7, 0.8, 0], [1, -1, 1, 0, 1, 0]]))
     start, goal = (hovi.FrameGoal("tool0", pose) for pose in poses)
-    motion = hovi.plan(scene, start, goal, 2.0)
+    motion = hovi.plan(scene, start, goal, 2.0, self_collision=False)
     assert motion.success, motion.message
     ends = motion.trajectory.sample([0.0, 2.0])
     np.testing.assert_allclose(ur5.frame_pose("tool0", ends.q), poses, atol=1e-9)
@@ -77,7 +79,7 @@ def test_ends_that_cannot_be_met_are_told(scene: hovi.Scene) -> None:
     """Without a start there is no motion; a goal gives a status, as before."""
     away = hovi.FrameGoal("tool0", position=[3.0, 0, 0])
     with pytest.raises(UnreachableError, match="misses it by"):
-        hovi.plan(scene, away, np.zeros(6), 1.0, **FAST)
-    motion = hovi.plan(scene, np.zeros(6), away, 1.0, **FAST)
+        hovi.plan(scene, away, np.zeros(6), 1.0, **FAST, self_collision=False)
+    motion = hovi.plan(scene, np.zeros(6), away, 1.0, **FAST, self_collision=False)
     assert motion.status is hovi.Status.INFEASIBLE
     assert "no configuration that reaches the goal was found" in motion.message

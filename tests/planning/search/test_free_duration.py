@@ -67,6 +67,7 @@ def test_the_duration_found_is_where_a_sweep_has_its_minimum() -> None:
             T,
             limits="none",
             guess=solution.trajectory,
+            self_collision=False,
         ).cost
         + WEIGHT * T
     )
@@ -110,12 +111,13 @@ def test_limits_hold_while_the_duration_is_found() -> None:
     task, weight = hovi.load_task(hovi.example("ur5_reach_limited")), 60.0
     ends = task.scene, task.start, task.goal
     options = {"limits": task.options.limits, "intervals": 24}
-    solution = hovi.plan(*ends, (1.5, 2.5), time_weight=weight, **options)
+    solution = hovi.plan(*ends, (1.5, 2.5), time_weight=weight, **options, self_collision=False)
     assert solution.success, solution.message
     T, guess = solution.trajectory.duration, solution.trajectory
     assert 1.5 < T < 2.5
     costs = [
-        hovi.plan(*ends, T * f, guess=guess, **options).cost + weight * T * f for f in (0.9, 1.1)
+        hovi.plan(*ends, T * f, guess=guess, **options, self_collision=False).cost + weight * T * f
+        for f in (0.9, 1.1)
     ]
     assert solution.cost < min(costs)
 
@@ -182,8 +184,10 @@ def test_a_first_duration_that_is_too_short_is_left(two_link: hovi.Robot) -> Non
 def test_between_velocity_limits_the_best_duration_is_that_of_a_scan() -> None:
     task, weight = hovi.load_task(hovi.example("ur5_reach_limited")), 1000.0
     ends, options = (task.scene, task.start, task.goal), {"limits": {"v": 3.14}}
-    found = hovi.plan(*ends, (0.2, 1.0), time_weight=weight, **options)
-    fixed = scan(lambda T: hovi.plan(*ends, T, continuation=False, **options), 0.2, 1.0)
+    found = hovi.plan(*ends, (0.2, 1.0), time_weight=weight, **options, self_collision=False)
+    fixed = scan(
+        lambda T: hovi.plan(*ends, T, continuation=False, **options, self_collision=False), 0.2, 1.0
+    )
     T, cost = least(fixed, weight)
     assert fixed[0.2].status is hovi.Status.INFEASIBLE  # by the mean velocity
     assert found.success, found.message

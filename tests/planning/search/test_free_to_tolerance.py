@@ -47,7 +47,9 @@ def reference(task: Task) -> Solution:
 
 def freed(task: Task, **options: object) -> Solution:
     fixed = {"time_weight": WEIGHT, "limits": "none", "processes": 1}
-    return plan(task.scene, task.start, task.goal, BOUNDS, **(fixed | options))  # type: ignore[arg-type]
+    return plan(
+        task.scene, task.start, task.goal, BOUNDS, **(fixed | options), self_collision=False
+    )  # type: ignore[arg-type]
 
 
 def accuracy_of(solution: Solution) -> Accuracy:
@@ -88,7 +90,7 @@ def test_the_tip_is_within_the_tolerance_at_the_returned_duration(task: Task) ->
     T = found.trajectory.duration
     ends = task.scene, task.start, task.goal, T
     fine = {"scheme": "galerkin-6", "intervals": 48, "guess": found.trajectory}
-    exact = plan(*ends, limits="none", processes=1, **fine)  # type: ignore[arg-type]
+    exact = plan(*ends, limits="none", processes=1, **fine, self_collision=False)  # type: ignore[arg-type]
     assert found.problem is not None
     costs = found.problem.ld.action(found.trajectory.path), exact.cost
     error = deviation(found.trajectory, exact.trajectory, costs)

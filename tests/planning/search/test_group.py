@@ -30,8 +30,10 @@ def test_the_motion_is_that_of_the_robot_with_its_hand_locked(scene: hovi.Scene)
     q, opening = start_of(scene, 0.02), {"panda_finger_joint1": 0.02, "panda_finger_joint2": 0.01}
     arm = hovi.load_robot("panda", locked=opening)
     goal = q + np.array([0.2] * 7 + [0, 0])
-    motion = hovi.plan(scene, q, hovi.State(goal), 1.5, group="arm", **FAST)
-    same = hovi.plan(hovi.Scene(arm, scene.effects), q[:7], goal[:7], 1.5, **FAST)
+    motion = hovi.plan(scene, q, hovi.State(goal), 1.5, group="arm", **FAST, self_collision=False)
+    same = hovi.plan(
+        hovi.Scene(arm, scene.effects), q[:7], goal[:7], 1.5, **FAST, self_collision=False
+    )
     assert motion.trajectory.robot is not None
     assert list(motion.trajectory.robot.joint_names) == ARM
     assert motion.trajectory.robot.source.held == opening
@@ -42,7 +44,7 @@ def test_the_motion_is_that_of_the_robot_with_its_hand_locked(scene: hovi.Scene)
 def test_a_frame_is_reached_with_the_hand_as_it_was(scene: hovi.Scene) -> None:
     q = start_of(scene, 0.03)
     goal = hovi.FrameGoal("panda_leftfinger", position=[0.45, 0.1, 0.5])
-    motion = hovi.plan(scene, q, goal, 2.0, group="arm")
+    motion = hovi.plan(scene, q, goal, 2.0, group="arm", self_collision=False)
     assert motion.success, motion.message
     last = np.concatenate([motion.trajectory.q[-1], q[-2:]])
     reached = scene.robot.frame_position("panda_leftfinger", last[None])[0]
@@ -54,14 +56,18 @@ def test_a_table_of_the_group_alone_leaves_the_other_joints_where_they_start(
 ) -> None:
     q = start_of(scene, 0.02)
     table = {joint: float(x) + 0.2 for joint, x in zip(ARM, q, strict=False)}
-    whole = hovi.plan(scene, q, q + np.array([0.2] * 7 + [0, 0]), 1.5, group="arm", **FAST)
+    whole = hovi.plan(
+        scene, q, q + np.array([0.2] * 7 + [0, 0]), 1.5, group="arm", **FAST, self_collision=False
+    )
     for goal in (table, {"q": table}, hovi.State(table)):
-        same = hovi.plan(scene, q, goal, 1.5, group="arm", **FAST)
+        same = hovi.plan(scene, q, goal, 1.5, group="arm", **FAST, self_collision=False)
         assert same.cost == pytest.approx(whole.cost, rel=1e-12)
     with pytest.raises(InputError, match="leaves out joint 'panda_finger_joint1'"):
-        hovi.plan(scene, q, table, 1.5, **FAST)
+        hovi.plan(scene, q, table, 1.5, **FAST, self_collision=False)
     with pytest.raises(InputError, match="leaves out joint 'panda_joint7'"):
-        hovi.plan(scene, q, dict(list(table.items())[:6]), 1.5, group="arm", **FAST)
+        hovi.plan(
+            scene, q, dict(list(table.items())[:6]), 1.5, group="arm", **FAST, self_collision=False
+        )
     written = "{ " + ", ".join(f"{joint} = {x}" for joint, x in table.items()) + " }"
     text = f'robot = "panda"\ngroup = "arm"\nstart.q = {q.tolist()}\nscheme = "galerkin-2"\n'
     text += "intervals = 8\ncontinuation = false\n[effects.gravity]\n"
@@ -76,12 +82,12 @@ def test_a_table_of_the_group_alone_leaves_the_other_joints_where_they_start(
 def test_a_goal_that_moves_other_joints_is_refused(scene: hovi.Scene) -> None:
     q = start_of(scene, 0.02)
     with pytest.raises(InputError, match="'panda_finger_joint1' is not in group 'arm'"):
-        hovi.plan(scene, q, start_of(scene, 0.03), 1.0, group="arm", **FAST)
+        hovi.plan(scene, q, start_of(scene, 0.03), 1.0, group="arm", **FAST, self_collision=False)
     with pytest.raises(InputError, match="no group 'amr': did you mean 'arm'"):
-        hovi.plan(scene, q, q, 1.0, group="amr", **FAST)
+        hovi.plan(scene, q, q, 1.0, group="amr", **FAST, self_collision=False)
     two_link = hovi.Scene(hovi.load_robot(hovi.example("two_link.urdf")))
     with pytest.raises(InputError, match="defines none"):
-        hovi.plan(two_link, [0, 0], [1, 1], 1.0, group="arm", **FAST)
+        hovi.plan(two_link, [0, 0], [1, 1], 1.0, group="arm", **FAST, self_collision=False)
 
 
 SRDF = """<robot name="panda">

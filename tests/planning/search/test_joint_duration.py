@@ -52,10 +52,10 @@ def test_a_free_duration_takes_at_most_three_times_the_steps_of_its_own_value(
 ) -> None:
     weight, bounds, _ = SCENES[name]
     ends, options = ends_of(name)
-    free = hovi.plan(*ends, bounds, time_weight=weight, **options, **grid)
+    free = hovi.plan(*ends, bounds, time_weight=weight, **options, **grid, self_collision=False)
     assert free.success, free.message
     assert abs(free.duration_derivative + weight) <= 1e-7 * weight
-    fixed = hovi.plan(*ends, free.trajectory.duration, **options, **grid)
+    fixed = hovi.plan(*ends, free.trajectory.duration, **options, **grid, self_collision=False)
     assert fixed.success, fixed.message
     assert free.nit <= 3 * fixed.nit
     assert "The best duration is" in free.message
@@ -65,10 +65,10 @@ def test_tightened_bounds_that_take_many_steps_give_way_to_halved_intervals() ->
     """With tightened bounds this duration moves for 200 steps, with halved intervals for 12."""
     ends, options = ends_of("panda_reach_limited")
     options |= {"intervals": 24}
-    free = hovi.plan(*ends, (0.5, 6.0), time_weight=50.0, **options)
+    free = hovi.plan(*ends, (0.5, 6.0), time_weight=50.0, **options, self_collision=False)
     assert free.success, free.message
     assert abs(free.duration_derivative + 50.0) <= 5e-6
-    fixed = hovi.plan(*ends, free.trajectory.duration, **options)
+    fixed = hovi.plan(*ends, free.trajectory.duration, **options, self_collision=False)
     assert free.nit <= 4 * fixed.nit
 
 
@@ -81,7 +81,9 @@ def test_a_motion_of_least_cost_has_its_own_duration(weight: float) -> None:
     tip = scene.robot.tip_frames[0]
     point = hovi.FrameGoal(tip, position=scene.robot.frame_position(tip, goal[None])[0])
     limits = {"base": "none", "v": 3.0, "tau": 300.0}
-    free = hovi.plan(scene, start, point, (0.2, 4.0), time_weight=weight, limits=limits)
+    free = hovi.plan(
+        scene, start, point, (0.2, 4.0), time_weight=weight, limits=limits, self_collision=False
+    )
     assert free.success, free.message
     T = free.trajectory.duration
     assert 0.21 < T < 3.9
@@ -91,7 +93,9 @@ def test_a_motion_of_least_cost_has_its_own_duration(weight: float) -> None:
 def test_durations_near_the_best_one_cost_more_within_limits() -> None:
     weight, bounds, _ = SCENES["panda_reach_limited"]
     ends, options = ends_of("panda_reach_limited")
-    free = hovi.plan(*ends, bounds, time_weight=weight, intervals=16, **options)
+    free = hovi.plan(
+        *ends, bounds, time_weight=weight, intervals=16, **options, self_collision=False
+    )
     assert free.success, free.message
     assert abs(free.duration_derivative + weight) <= 1e-7 * weight
     T = free.trajectory.duration

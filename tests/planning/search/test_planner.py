@@ -37,7 +37,7 @@ GOAL = State(REACH_Q, REACH_V)
 def swing_up(scene: Scene, **options: Any) -> Solution:
     """A swing-up in three seconds, which has many minima."""
     options = {"intervals": 12, "scheme": "galerkin-1", "processes": 1, "limits": "none"} | options
-    return plan(scene, HANG, -HANG, 3.0, **options)
+    return plan(scene, HANG, -HANG, 3.0, **options, self_collision=False)
 
 
 def assert_same(one: Solution, other: Solution) -> None:
@@ -390,7 +390,7 @@ def test_a_whole_number_of_starts_may_be_a_float(arm_scene: Scene) -> None:
 def test_an_invalid_robot_is_refused_before_any_work() -> None:
     robot = load_robot(half_turning())
     with pytest.raises(ModelError, match=r"does not support planning.*'last' mimic"):
-        plan(Scene(robot, [Gravity()]), robot.neutral(), robot.neutral(), 1.0)
+        plan(Scene(robot, [Gravity()]), robot.neutral(), robot.neutral(), 1.0, self_collision=False)
 
 
 def test_distant_limits_do_not_limit_the_accuracy(two_link: Robot) -> None:

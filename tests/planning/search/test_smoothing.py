@@ -46,7 +46,7 @@ def rows(motion: hovi.Trajectory, per_interval: int = 65) -> tuple[Array, ...]:
 
 @pytest.fixture(scope="module")
 def smooth(ur5: hovi.Scene) -> hovi.Solution:
-    return hovi.plan(ur5, START, GOAL, 1.5, smooth=True)
+    return hovi.plan(ur5, START, GOAL, 1.5, smooth=True, self_collision=False)
 
 
 def test_a_smooth_motion_begins_and_ends_without_acceleration(smooth: hovi.Solution) -> None:
@@ -106,7 +106,9 @@ def test_a_limit_on_a_rate_holds_everywhere(
     """It is exceeded without it, and is reached with it."""
     column = {"jerk": 5, "torque_rate": 6}[kind]
     bound = 0.8 * float(np.abs(rows(smooth.trajectory)[column]).max())
-    found = hovi.plan(ur5, START, GOAL, 1.5, smooth=True, limits={kind: bound})
+    found = hovi.plan(
+        ur5, START, GOAL, 1.5, smooth=True, limits={kind: bound}, self_collision=False
+    )
     assert found.success, found.message
     values = rows(found.trajectory)[column]
     assert 0.9 * bound < np.abs(values).max() < (1 + 3e-6) * bound
@@ -119,7 +121,7 @@ def test_a_limit_on_a_rate_holds_everywhere(
 
 def test_far_limits_on_the_torque_rate_change_nothing(ur5: hovi.Scene) -> None:
     one, other = (
-        hovi.plan(ur5, START, GOAL, 1.5, smooth=True, limits=limits)
+        hovi.plan(ur5, START, GOAL, 1.5, smooth=True, limits=limits, self_collision=False)
         for limits in ({"a": 6.0}, {"a": 6.0, "torque_rate": 1e5})
     )
     assert one.success
@@ -130,7 +132,7 @@ def test_far_limits_on_the_torque_rate_change_nothing(ur5: hovi.Scene) -> None:
 def test_given_accelerations_are_met(ur5: hovi.Scene) -> None:
     start = hovi.State(START, a=np.full(6, 0.5))
     goal = hovi.State(GOAL, np.full(6, 0.1), a=np.full(6, -0.3))
-    found = hovi.plan(ur5, start, goal, 1.5, smooth=True)
+    found = hovi.plan(ur5, start, goal, 1.5, smooth=True, self_collision=False)
     assert found.success, found.message
     _, v, a = found.trajectory.jet([0.0, 1.5])
     np.testing.assert_allclose(a, [np.full(6, 0.5), np.full(6, -0.3)], atol=1e-9)
@@ -139,30 +141,36 @@ def test_given_accelerations_are_met(ur5: hovi.Scene) -> None:
 
 def test_an_end_acceleration_outside_its_limits_is_infeasible_by_name(ur5: hovi.Scene) -> None:
     start = hovi.State(START, a=np.full(6, 7.0))
-    found = hovi.plan(ur5, start, GOAL, 1.5, smooth=True, limits={"a": 6.0})
+    found = hovi.plan(ur5, start, GOAL, 1.5, smooth=True, limits={"a": 6.0}, self_collision=False)
     assert found.status == "infeasible"
     assert "acceleration of joint 'shoulder_pan_joint' at the start is 7 rad/s^2" in found.message
 
 
 def test_frames_via_points_and_obstacles_go_with_a_cost_on_the_jerk(ur5: hovi.Scene) -> None:
     via = hovi.Via(0.7, hovi.State((START + GOAL) / 2, free_velocity=ur5.robot.joint_names))
-    middle = hovi.plan(ur5, START, GOAL, 1.5, smooth=True, via=[via])
+    middle = hovi.plan(ur5, START, GOAL, 1.5, smooth=True, via=[via], self_collision=False)
     assert middle.success, middle.message
     np.testing.assert_allclose(
         middle.trajectory.configurations([0.7])[0], (START + GOAL) / 2, atol=1e-8
     )
     frame = ur5.robot.tip_frame
     position = ur5.robot.frame_positions((frame,), GOAL[None])[0][0]
-    reach = hovi.plan(ur5, START, hovi.FrameGoal(frame, position=position), 1.5, smooth=True)
+    reach = hovi.plan(
+        ur5, START, hovi.FrameGoal(frame, position=position), 1.5, smooth=True, self_collision=False
+    )
     assert reach.success, reach.message
     end = ur5.robot.frame_positions((frame,), reach.trajectory.q[-1:])[0][0]
     np.testing.assert_allclose(end, position, atol=1e-7)
 
 
 def test_several_starts_and_a_free_duration_go_with_it(ur5: hovi.Scene) -> None:
-    several = hovi.plan(ur5, START, GOAL, 1.5, smooth=True, starts=3, processes=1)
+    several = hovi.plan(
+        ur5, START, GOAL, 1.5, smooth=True, starts=3, processes=1, self_collision=False
+    )
     assert several.success, several.message
-    free = hovi.plan(ur5, START, GOAL, (0.8, 4.0), smooth=True, time_weight=100.0)
+    free = hovi.plan(
+        ur5, START, GOAL, (0.8, 4.0), smooth=True, time_weight=100.0, self_collision=False
+    )
     assert free.success, free.message
     assert 0.8 < free.trajectory.duration < 4.0
     assert abs(free.duration_derivative + 100.0) < 0.2
@@ -190,13 +198,13 @@ def test_a_duration_whose_square_is_no_number_is_refused(two_link: Robot, durati
 def test_both_smooth_and_a_weight_of_the_jerk_are_refused(ur5: hovi.Scene) -> None:
     scene = hovi.Scene(ur5.robot, [Gravity(), JerkCost(0.1)])
     with pytest.raises(InputError, match="leave one of the two out"):
-        hovi.plan(scene, START, GOAL, 1.5, smooth=True)
+        hovi.plan(scene, START, GOAL, 1.5, smooth=True, self_collision=False)
 
 
 def test_limits_on_rates_without_a_cost_on_the_jerk_are_refused(ur5: hovi.Scene) -> None:
     for limits in ({"jerk": 10.0}, {"torque_rate": 10.0}):
         with pytest.raises(InputError, match="add the effect jerk_cost to the scene, set smooth"):
-            hovi.plan(ur5, START, GOAL, 1.5, limits=limits)
+            hovi.plan(ur5, START, GOAL, 1.5, limits=limits, self_collision=False)
 
 
 def test_continuous_joints_move_smoothly_within_limits_on_the_torque_rate() -> None:
@@ -205,7 +213,7 @@ def test_continuous_joints_move_smoothly_within_limits_on_the_torque_rate() -> N
     scene = hovi.Scene(robot, [Gravity()])
     start = robot.integrate(robot.neutral(), np.array([0.3, 2.8, 1.2, 0.5, 1.0, 0.2]))
     goal = robot.integrate(start, np.array([0.8, 0.4, -0.3, 0.6, 0.4, -0.5]))
-    free = hovi.plan(scene, start, goal, 1.5, smooth=True)
+    free = hovi.plan(scene, start, goal, 1.5, smooth=True, self_collision=False)
     assert free.success, free.message
 
     def largest_rate(motion: hovi.Trajectory) -> float:
@@ -214,7 +222,9 @@ def test_continuous_joints_move_smoothly_within_limits_on_the_torque_rate() -> N
         return float(np.abs((tau[0] - 8 * tau[1] + 8 * tau[2] - tau[3]) / (12 * h)).max())
 
     bound = 0.8 * largest_rate(free.trajectory)
-    found = hovi.plan(scene, start, goal, 1.5, smooth=True, limits={"torque_rate": bound})
+    found = hovi.plan(
+        scene, start, goal, 1.5, smooth=True, limits={"torque_rate": bound}, self_collision=False
+    )
     assert found.success, found.message
     np.testing.assert_allclose(found.trajectory.jet([0.0, 1.5])[2], 0.0, atol=1e-9)
     assert largest_rate(found.trajectory) < (1 + 1e-4) * bound

@@ -61,14 +61,16 @@ def passing() -> list[Segment]:
 
 @cache
 def planned() -> hovi.Solution:
-    found = hovi.plan_sequence(scene(), [0.0, 0.0], segments(), limits="none")
+    found = hovi.plan_sequence(scene(), [0.0, 0.0], segments(), limits="none", self_collision=False)
     assert found.success, found.message
     return found
 
 
 @cache
 def passed() -> hovi.Solution:
-    found = hovi.plan_sequence(scene(), [0.0, 0.0], passing(), limits="none", tolerance=1e-6)
+    found = hovi.plan_sequence(
+        scene(), [0.0, 0.0], passing(), limits="none", tolerance=1e-6, self_collision=False
+    )
     assert found.success, found.message
     return found
 
@@ -96,10 +98,14 @@ def test_stops_cost_what_the_motions_cost_one_by_one() -> None:
     ends, total = [[0.0, 0.0], GRAB, PUT, [0.0, 0.0]], 0.0
     for (start, goal), each in zip(itertools.pairwise(ends), segments(), strict=True):
         alone = hovi.Scene(scene().robot, [*scene().effects, *each.effects])
-        one = hovi.plan(alone, start, goal, each.duration, limits="none", tolerance=1e-6)
+        one = hovi.plan(
+            alone, start, goal, each.duration, limits="none", tolerance=1e-6, self_collision=False
+        )
         assert one.success, one.message
         total += one.cost
-    found = hovi.plan_sequence(scene(), [0.0, 0.0], segments(), limits="none", tolerance=1e-6)
+    found = hovi.plan_sequence(
+        scene(), [0.0, 0.0], segments(), limits="none", tolerance=1e-6, self_collision=False
+    )
     assert found.success, found.message
     assert found.cost == pytest.approx(total, rel=2e-6)
     assert planned().cost == pytest.approx(total, rel=1e-3)
@@ -133,7 +139,13 @@ def test_the_planned_torques_move_the_robot_and_what_it_carries_along_the_motion
 
 def test_passing_through_is_cheaper_than_a_stop_and_ipopts_motion() -> None:
     found = hovi.plan_sequence(
-        scene(), [0.0, 0.0], passing(), limits="none", scheme="galerkin-2", intervals=23
+        scene(),
+        [0.0, 0.0],
+        passing(),
+        limits="none",
+        scheme="galerkin-2",
+        intervals=23,
+        self_collision=False,
     )
     assert found.problem is not None
     assert found.problem.grid.t[6] == pytest.approx(0.6)
@@ -165,23 +177,31 @@ def test_a_seam_without_a_goal_is_where_the_best_motion_passes() -> None:
     """One robot throughout, with a node more: the motion of a single plan."""
     halves = [Segment(None, 0.4), Segment([0.7, 0.9], 0.6)]
     options: dict[str, Any] = {"limits": "none", "tolerance": 1e-6}
-    found = hovi.plan_sequence(scene(), [0.0, 0.0], halves, **options)
-    single = hovi.plan(scene(), [0.0, 0.0], [0.7, 0.9], 1.0, **options)
+    found = hovi.plan_sequence(scene(), [0.0, 0.0], halves, **options, self_collision=False)
+    single = hovi.plan(scene(), [0.0, 0.0], [0.7, 0.9], 1.0, **options, self_collision=False)
     assert found.cost == pytest.approx(single.cost, rel=2e-6)
 
 
 def test_one_segment_is_a_plan() -> None:
     found = hovi.plan_sequence(
-        scene(), [0.0, 0.0], [Segment(GRAB, 1.0, effects=[LOAD], limits="none")]
+        scene(),
+        [0.0, 0.0],
+        [Segment(GRAB, 1.0, effects=[LOAD], limits="none")],
+        self_collision=False,
     )
     loaded = hovi.Scene(scene().robot, [*scene().effects, LOAD])
-    assert found.cost == hovi.plan(loaded, [0.0, 0.0], GRAB, 1.0, limits="none").cost
+    assert (
+        found.cost
+        == hovi.plan(loaded, [0.0, 0.0], GRAB, 1.0, limits="none", self_collision=False).cost
+    )
 
 
 def test_an_effect_of_a_segment_takes_the_place_of_the_scenes_own() -> None:
     heavy = hovi.effects.Payload(frame="tip", mass=2.0)
     both = hovi.Scene(scene().robot, [*scene().effects, heavy])
-    found = hovi.plan_sequence(both, [0.0, 0.0], segments(), limits="none", intervals=12)
+    found = hovi.plan_sequence(
+        both, [0.0, 0.0], segments(), limits="none", intervals=12, self_collision=False
+    )
     parts = found.trajectory.segments
     assert parts is not None
     carried = [next(e.mass for e in s.effects if e.key == "payload") for s in parts.scenes]  # type: ignore[attr-defined]
@@ -193,7 +213,7 @@ def test_each_segment_keeps_its_own_limits() -> None:
     slow = {"base": "none", "v": [1.0, 3.0]}
     given = [Segment(x.goal, 1.2 * x.duration, effects=x.effects) for x in segments()]
     given[1] = Segment(PUT, 1.1, effects=[LOAD], limits=slow)
-    found = hovi.plan_sequence(scene(), [0.0, 0.0], given, limits="none")
+    found = hovi.plan_sequence(scene(), [0.0, 0.0], given, limits="none", self_collision=False)
     assert found.success, found.message
     t = np.linspace(0.0, found.trajectory.duration, 4001)
     v, inside = np.abs(found.trajectory.sample(t).v), (t >= 0.72) & (t <= 1.82)
@@ -204,7 +224,12 @@ def test_each_segment_keeps_its_own_limits() -> None:
 
 def test_limits_of_all_segments_are_written_as_those_of_one_motion() -> None:
     found = hovi.plan_sequence(
-        scene(), [0.0, 0.0], segments(), limits={"base": "none", "v": 20.0}, intervals=12
+        scene(),
+        [0.0, 0.0],
+        segments(),
+        limits={"base": "none", "v": 20.0},
+        intervals=12,
+        self_collision=False,
     )
     assert "limits" in found.trajectory.metadata
 
@@ -213,7 +238,7 @@ def test_a_segment_that_waits_stays_where_it_is() -> None:
     """As while a gripper closes; holding the arm costs what its torque at rest does."""
     wait = Segment(GRAB, 0.3, limits={"base": "none", "v": 1e-3}, name="close")
     given = [segments()[0], wait, *segments()[1:]]
-    found = hovi.plan_sequence(scene(), [0.0, 0.0], given, limits="none")
+    found = hovi.plan_sequence(scene(), [0.0, 0.0], given, limits="none", self_collision=False)
     assert found.success, found.message
     q = found.trajectory.sample(np.linspace(0.6, 0.9, 31)).q
     assert np.abs(q - GRAB).max() < 3e-4
@@ -265,7 +290,7 @@ def test_a_frame_where_segments_meet_is_met_at_rest_or_in_passing() -> None:
     for free, moving in (((), False), (("all",), True)):
         goal = hovi.FrameGoal("tip", position=tip, free_velocity=free)
         given = [Segment(goal, 0.6), *segments()[1:]]
-        found = hovi.plan_sequence(scene(), [0.0, 0.0], given, limits="none")
+        found = hovi.plan_sequence(scene(), [0.0, 0.0], given, limits="none", self_collision=False)
         assert found.success, found.message
         m = found.trajectory.sample([0.6])
         np.testing.assert_allclose(robot.frame_position("tip", m.q)[0], tip, atol=1e-9)
@@ -278,7 +303,12 @@ def test_a_tolerance_is_met_although_torques_jump() -> None:
     tip = scene().robot.frame_position("tip", np.array([PUT]))[0]
     given = [segments()[0], Segment(hovi.FrameGoal("tip", position=tip), 0.9, effects=[LOAD])]
     found = hovi.plan_sequence(
-        scene(), [0.0, 0.0], [*given, segments()[2]], limits="none", tolerance=1e-6
+        scene(),
+        [0.0, 0.0],
+        [*given, segments()[2]],
+        limits="none",
+        tolerance=1e-6,
+        self_collision=False,
     )
     assert found.success, found.message
     assert found.accuracy is not None
@@ -296,14 +326,18 @@ def test_a_frame_is_met_within_the_limits_of_its_own_segment() -> None:
         Segment(hovi.FrameGoal("tip", position=tip), 0.9),
         segments()[2],
     ]
-    found = hovi.plan_sequence(scene(), [0.0, 0.0], given, limits="none", intervals=16)
+    found = hovi.plan_sequence(
+        scene(), [0.0, 0.0], given, limits="none", intervals=16, self_collision=False
+    )
     assert found.status is not hovi.Status.INFEASIBLE, found.message
     reached = found.trajectory.configurations([1.7])
     np.testing.assert_allclose(scene().robot.frame_position("tip", reached)[0], tip, atol=1e-8)
 
 
 def test_smooth_sequences_have_continuous_accelerations() -> None:
-    found = hovi.plan_sequence(scene(), [0.0, 0.0], segments(), limits="none", smooth=True)
+    found = hovi.plan_sequence(
+        scene(), [0.0, 0.0], segments(), limits="none", smooth=True, self_collision=False
+    )
     assert found.success, found.message
     motion = found.trajectory
     for t in (0.6, 1.5):
@@ -316,7 +350,9 @@ def test_smooth_sequences_have_continuous_accelerations() -> None:
 
 def test_a_via_point_within_a_segment_keeps_its_time() -> None:
     via = hovi.Via(1.0, State([1.2, 1.0]))
-    found = hovi.plan_sequence(scene(), [0.0, 0.0], segments(), limits="none", via=[via])
+    found = hovi.plan_sequence(
+        scene(), [0.0, 0.0], segments(), limits="none", via=[via], self_collision=False
+    )
     assert found.success, found.message
     np.testing.assert_allclose(found.trajectory.sample([1.0]).q[0], [1.2, 1.0], atol=1e-8)
     np.testing.assert_allclose(found.trajectory.sample([0.6]).q[0], GRAB, atol=1e-12)
@@ -332,6 +368,7 @@ def test_an_obstacle_is_avoided_while_something_is_carried() -> None:
         limits="none",
         obstacles=[hovi.Sphere(at, 0.03)],
         intervals=24,
+        self_collision=False,
     )
     assert found.cost > planned().cost
     moved = found.trajectory.configurations(np.linspace(0.0, 2.3, 1001))
@@ -341,7 +378,13 @@ def test_an_obstacle_is_avoided_while_something_is_carried() -> None:
 def test_the_grid_has_the_intervals_and_a_node_at_every_seam() -> None:
     for N in (3, 5, 17):
         found = hovi.plan_sequence(
-            scene(), [0.0, 0.0], segments(), limits="none", intervals=N, max_iterations=1
+            scene(),
+            [0.0, 0.0],
+            segments(),
+            limits="none",
+            intervals=N,
+            max_iterations=1,
+            self_collision=False,
         )
         assert found.trajectory.grid.intervals == N
         assert np.abs(found.trajectory.t[:, None] - [0.6, 1.5]).min(axis=0).max() < 1e-12
@@ -359,7 +402,9 @@ def test_the_names_and_scenes_of_segments_are_saved(tmp_path: Path) -> None:
 
 def test_a_coarse_sequence_is_the_guess_of_a_fine_one() -> None:
     """More intervals than twice the grid of the search, which keeps the seams."""
-    found = hovi.plan_sequence(scene(), [0.0, 0.0], segments(), limits="none", intervals=230)
+    found = hovi.plan_sequence(
+        scene(), [0.0, 0.0], segments(), limits="none", intervals=230, self_collision=False
+    )
     assert found.success, found.message
     assert found.cost == pytest.approx(planned().cost, rel=1e-3)
 
@@ -367,7 +412,10 @@ def test_a_coarse_sequence_is_the_guess_of_a_fine_one() -> None:
 def test_several_starts_find_the_same_with_any_number_of_processes() -> None:
     options: dict[str, Any] = {"limits": "none", "starts": 5, "intervals": 12}
     one, two = (
-        hovi.plan_sequence(scene(), [0.0, 0.0], segments(), **options, processes=n) for n in (1, 2)
+        hovi.plan_sequence(
+            scene(), [0.0, 0.0], segments(), **options, processes=n, self_collision=False
+        )
+        for n in (1, 2)
     )
     assert one.minima == two.minima
     assert one.cost <= planned().cost * 1.01
@@ -420,7 +468,7 @@ def test_a_segment_that_cannot_be_is_named_before_solving() -> None:
 def test_a_frame_out_of_reach_is_told() -> None:
     far = hovi.FrameGoal("tip", position=[9.0, 0.0, 0.0])
     given = [Segment(far, 0.6), *segments()[1:]]
-    found = hovi.plan_sequence(scene(), [0.0, 0.0], given, limits="none")
+    found = hovi.plan_sequence(scene(), [0.0, 0.0], given, limits="none", self_collision=False)
     assert not found.success
     assert "no configuration that reaches" in found.message
 
@@ -471,7 +519,7 @@ def test_the_shipped_sequence_is_planned() -> None:
 )
 def test_what_is_no_sequence_is_refused(given: Any, options: Any, said: str) -> None:
     with pytest.raises(HoviError, match=re.escape(said)):
-        hovi.plan_sequence(scene(), [0.0, 0.0], given, **options)
+        hovi.plan_sequence(scene(), [0.0, 0.0], given, **options, self_collision=False)
 
 
 @pytest.mark.parametrize("duration", [0.0, -1.0, float("nan"), float("inf"), "2 parsecs", None])
@@ -490,7 +538,7 @@ def test_effects_that_are_none_are_refused(effects: Any) -> None:
 def test_a_time_limit_that_ends_before_the_search_leaves_the_guess(seconds: float) -> None:
     goal = hovi.FrameGoal("tip", position=[-0.6, 0.0, 1.4])
     parts = [Segment(goal, 0.6), Segment([0.0, 0.0], 0.8)]
-    late = hovi.plan_sequence(scene(), [0.0, 0.0], parts, time_limit=seconds)
+    late = hovi.plan_sequence(scene(), [0.0, 0.0], parts, time_limit=seconds, self_collision=False)
     assert late.status is hovi.Status.TIME_LIMIT
     assert np.isfinite(late.cost)
 
@@ -509,7 +557,9 @@ def test_obstacles_that_move_are_looked_at_by_the_clock_of_the_sequence() -> Non
     ):
         path = {"times": times, "positions": positions}
         ball = hovi.Sphere(tip, 0.1, name="ball", path=path)
-        found = hovi.plan_sequence(arm, q[0], parts, obstacles=[ball], time_limit=0.2)
+        found = hovi.plan_sequence(
+            arm, q[0], parts, obstacles=[ball], time_limit=0.2, self_collision=False
+        )
         assert ("and obstacle 'ball' overlap" in found.message) == refused
 
 

@@ -159,7 +159,9 @@ def test_options_without_a_key_are_refused_on_saving(folder: Path) -> None:
     for name, value in (("weight", [1.0, 2.0]), ("processes", 2)):
         with pytest.raises(SceneError, match=f"no key for option '{name}'"):
             save_task(task.with_options(**{name: value}), folder / "again.toml")
-    motion = hovi.plan(task.scene, [0, 0], [0.1, 0.1], 1.0, intervals=2).trajectory
+    motion = hovi.plan(
+        task.scene, [0, 0], [0.1, 0.1], 1.0, intervals=2, self_collision=False
+    ).trajectory
     with pytest.raises(SceneError, match="no key for a motion as option 'guess'"):
         save_task(task.with_options(guess=motion), folder / "again.toml")
     own = dataclasses.replace(galerkin(2), name="mine")

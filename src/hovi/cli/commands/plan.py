@@ -45,6 +45,13 @@ def plan(
         bool | None,
         typer.Option("--smooth/--no-smooth", help="Override the scene's: a cost on the jerk."),
     ] = None,
+    self_collision: Annotated[
+        bool | None,
+        typer.Option(
+            "--self-collision/--no-self-collision",
+            help="Override the scene's: whether links keep apart.",
+        ),
+    ] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of the random guesses.")] = None,
     time_limit: Annotated[
         str | None, typer.Option(metavar="SECONDS", help="Return the best motion found by then.")
@@ -195,10 +202,11 @@ def _note_assumptions(task: Task) -> None:
     from hovi.planning.search.group import in_group
 
     scene, group = task.scene, task.options.group
+    noted = [task.note] if task.note else []
     if group is not None:
         scene, _, _ = in_group(scene, group, task.start, task.goal)
     with suppress(OSError):  # stderr may be closed
-        for sentence in assumptions(scene, weighted=task.options.weight is not None):
+        for sentence in (*noted, *assumptions(scene, weighted=task.options.weight is not None)):
             print(f"note: {sentence}", file=sys.stderr, flush=True)
 
 

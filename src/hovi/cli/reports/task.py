@@ -35,8 +35,8 @@ def describe_task(task: Task) -> str:
         lines += [f"limits of a {arm.title}, published in", *source_lines(arm)]
     for each in options.grasped:
         lines.append(f"holds {each.name!r}, {each.mass:g} kg, at {each.frame!r}")
-    if options.clearance.wanted:
-        lines.append(f"keeps {options.clearance.margin:g} m from {_kept_from(task)}")
+    if kept_from := _kept_from(task):
+        lines.append(f"keeps {options.clearance.margin:g} m from {kept_from}")
     lines += _end(task.start, "start", robot)
     lines += _segments(task) if task.segments else _end(task.goal, "goal", robot)
     for via in options.via:
@@ -100,8 +100,12 @@ def _frame_parts(goal: FrameGoal) -> list[str]:
 
 
 def _kept_from(task: Task) -> str:
-    names = [repr(each.name) for each in task.options.clearance.obstacles]
-    return ", ".join(names + (["itself"] if task.options.clearance.self_collision else []))
+    """The names of obstacles, and "itself" where links are kept apart; "" for nothing."""
+    options = task.options
+    names = [repr(each.name) for each in options.clearance.obstacles]
+    has_shapes = "<collision" in (task.scene.robot.source.urdf or "")
+    apart = has_shapes if options.self_collision is None else options.self_collision
+    return ", ".join(names + (["itself"] if apart else []))
 
 
 def _limits(limits: str | Limits | Mapping[str, Any]) -> str:

@@ -24,7 +24,7 @@ TOUCH_DEPTH = 1e-3
 """Depth by which shapes that may touch may overlap, in [m]."""
 
 
-@check_arguments_except("obstacles", "margin", "may_touch")
+@check_arguments_except("obstacles", "margin", "may_touch", "left_out")
 @dataclass(frozen=True, eq=False)
 class Clearance:
     """distance >= margin between the robot's collision shapes and obstacles, all along a motion.
@@ -37,6 +37,7 @@ class Clearance:
         at every configuration.
     may_touch: pairs of names, of a link and of an obstacle or another link, that need not keep the
         margin and may overlap by TOUCH_DEPTH, such as what is grasped and what it stands on.
+    left_out: pairs of names of links that are not kept apart.
     Raises InputError for other objects, equal names or a margin that is no length.
     """
 
@@ -44,6 +45,7 @@ class Clearance:
     margin: float = DEFAULT_MARGIN
     self_collision: bool = False
     may_touch: Sequence[tuple[str, str]] = ()
+    left_out: Sequence[tuple[str, str]] = ()
 
     def __post_init__(self) -> None:
         if isinstance(self.obstacles, Obstacle | Mapping):
@@ -69,7 +71,8 @@ class Clearance:
             if names.count(name) > 1:
                 raise InputError(f"two obstacles have the name {name!r}; give each its own name.")
         object.__setattr__(self, "obstacles", named)
-        object.__setattr__(self, "may_touch", _pairs_of_names(self.may_touch))
+        for name in ("may_touch", "left_out"):
+            object.__setattr__(self, name, _pairs_of_names(getattr(self, name), name))
         number = isinstance(self.margin, float | int) and not isinstance(self.margin, bool)
         if not (number and 0 <= self.margin <= MAX_MARGIN):
             raise InputError(
@@ -99,7 +102,11 @@ class Clearance:
             "obstacles": [each.recorded().to_dict() for each in self.obstacles],
             "margin": float(self.margin),
             "self_collision": bool(self.self_collision),
-            **({"may_touch": [list(pair) for pair in self.may_touch]} if self.may_touch else {}),
+            **{
+                name: [list(pair) for pair in pairs]
+                for name, pairs in (("may_touch", self.may_touch), ("left_out", self.left_out))
+                if pairs
+            },
         }
 
     @classmethod
@@ -111,9 +118,11 @@ class Clearance:
             if any("file" in each for each in data["obstacles"]):
                 raise InputError("a recorded clearance names no files.")
             obstacles = [obstacle_from_dict(each) for each in data["obstacles"]]
-            touching = [tuple(pair) for pair in data.get("may_touch", ())]
+            touching, left_out = (
+                [tuple(pair) for pair in data.get(name, ())] for name in ("may_touch", "left_out")
+            )
             margin, both = float(data["margin"]), bool(data["self_collision"])
-            return cls(obstacles, margin, both, touching)
+            return cls(obstacles, margin, both, touching, left_out)
         except (KeyError, TypeError, ValueError, OverflowError, AttributeError) as error:
             raise InputError(
                 f"expected the clearance that `to_dict` returns, got data with {error!r}."
@@ -129,12 +138,10 @@ def _obstacles(given: Any, number: int) -> Sequence[Any]:
     return obstacles_from_table(given, number)
 
 
-def _pairs_of_names(pairs: Any) -> tuple[tuple[str, str], ...]:
-    """Pairs of different names. Raises InputError for anything else."""
+def _pairs_of_names(pairs: Any, field: str) -> tuple[tuple[str, str], ...]:
+    """Pairs of different names. field: of a Clearance. Raises InputError for anything else."""
     if not isinstance(pairs, Sequence) or not all(_is_pair(pair) for pair in pairs):
-        raise InputError(
-            f"may_touch must be a list of pairs of different names, got {pairs!r:.200}."
-        )
+        raise InputError(f"{field} must be a list of pairs of different names, got {pairs!r:.200}.")
     return tuple((first, second) for first, second in pairs)
 
 
@@ -159,7 +166,7 @@ class PartOfClearance(Clearance):
     def of(cls, whole: Clearance, numbers: Sequence[int]) -> PartOfClearance:
         """Of pairs by their numbers."""
         fields = whole.obstacles, whole.margin, whole.self_collision, whole.may_touch
-        return cls(*fields, whole, tuple(int(k) for k in numbers))
+        return cls(*fields, whole.left_out, whole, tuple(int(k) for k in numbers))
 
     @property
     def wanted(self) -> bool:

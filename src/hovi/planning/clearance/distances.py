@@ -82,7 +82,10 @@ class Distances:
                         pairs.append(Pair(links[i], obstacle.name, True))
                         ends.append((i, number))
         if clearance.self_collision:
+            left_out = {frozenset(each) for each in clearance.left_out}
             for i, j in self_collision_pairs(robot, clearance.may_touch):
+                if frozenset((links[i], links[j])) in left_out:
+                    continue
                 pairs.append(Pair(links[i], links[j], False))
                 ends.append((i, j))
         if not pairs:

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from hovi.errors import warn
+from hovi.errors import ModelError, warn
 from hovi.planning.clearance.convex_shapes import convex_geometry
 from hovi.planning.clearance.pair_distances import PairDistances
 from hovi.robot.robot import Robot
@@ -48,6 +48,26 @@ def pairs_left_out(robot: Robot, may_touch: tuple[tuple[str, str], ...] = ()) ->
     advice = "name the links in `may_touch` of the grasped object"
     found = [_sentence(robot, of_robot, "disable them in an SRDF")] if of_robot else []
     return found + ([_sentence(robot, of_grasped, advice)] if of_grasped else [])
+
+
+@lru_cache(maxsize=16)
+def can_keep_apart(robot: Robot, may_touch: tuple[tuple[str, str], ...] = ()) -> bool:
+    """Whether a robot has all of its collision shapes, and links that can be kept apart."""
+    try:
+        return bool(self_collision_pairs(robot, may_touch))
+    except ModelError:
+        return False
+
+
+def not_looked_at(robot: Robot) -> str:
+    """Why links of a robot with collision shapes cannot be kept apart, as a sentence, or ""."""
+    if "<collision" not in (robot.source.urdf or ""):
+        return ""
+    try:
+        self_collision_pairs(robot)
+    except ModelError as error:
+        return f"Self-collision was not looked at: {error}"
+    return ""
 
 
 @lru_cache(maxsize=16)

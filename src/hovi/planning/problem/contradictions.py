@@ -24,6 +24,9 @@ Mask = npt.NDArray[np.bool_]
 MARGIN_TOLERANCE = 1e-9
 """Distance by which an end may violate the margin, in [m]."""
 
+LETTING_LINKS_MEET = "let links meet by self_collision = false"
+"""What to do about links that are too near at an end."""
+
 
 def contradiction(problem: TrajectoryProblem, limits: Limits) -> str:
     """Why no motion between the problem's ends satisfies the limits; "" if none is found.
@@ -101,8 +104,9 @@ def _end_in_obstacle(problem: TrajectoryProblem) -> str:
         if d[k] < margin - MARGIN_TOLERANCE:
             distance = float(d[k] - problem.distances.allowance[k])
             needed = "" if distance < TOUCHING else f", less than the margin of {margin:g} m"
-            advice = f"change the {end}" + (" or move the obstacle" if pairs[k].obstacle else "")
-            return f"at the {end} {pairs[k]} {distance_in_words(distance)}{needed}; {advice}"
+            advice = "move the obstacle" if pairs[k].obstacle else LETTING_LINKS_MEET
+            apart = f"{distance_in_words(distance)}{needed}"
+            return f"at the {end} {pairs[k]} {apart}; change the {end} or {advice}"
     goals = [(problem.goal, "goal"), *((via.goal, "via point") for via in problem.via)]
     for goal, name in goals:
         if isinstance(goal, FrameGoal):

@@ -29,6 +29,7 @@ from hovi.planning.search.option_fields import (
     require_known,
     whole_number,
 )
+from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
 from hovi.schemes import Scheme, by_name
 from hovi.system.dataclass import dataclass
@@ -65,7 +66,7 @@ def _always(options: PlanOptions) -> bool:
 
 
 def _if_clearance(options: PlanOptions) -> bool:
-    return options.clearance.wanted
+    return options.clearance.wanted or options.margin != DEFAULT_MARGIN
 
 
 @check_arguments_except(*_CHECKED_HERE)
@@ -140,10 +141,11 @@ class PlanOptions:
         SceneKey("a length of 0 or more, in metres", written=_if_clearance),
         least=0,
     )
-    self_collision: bool = option(
-        False,
-        "whether the robot's links keep this distance from each other, too.",
-        SceneKey("true or false", written=_if_clearance),
+    self_collision: bool | None = option(
+        None,
+        "whether the robot's links keep this distance from each other, too: if None, wherever it "
+        "has collision shapes. With False links may meet.",
+        SceneKey("true or false"),
     )
     guess: str | Trajectory = option(
         "cubic",
@@ -270,10 +272,10 @@ class PlanOptions:
 
     @cached_property
     def clearance(self) -> Clearance:
-        """Obstacles and self-collision, with their margin."""
+        """Obstacles and self-collision, with their margin; without it where it is not decided."""
         touching = [(each.name, other) for each in self.grasped for other in each.may_touch]
         with prepared_within(self.time_limit_seconds):
-            return Clearance(self.obstacles, self.margin, self.self_collision, touching)
+            return Clearance(self.obstacles, self.margin, bool(self.self_collision), touching)
 
     def with_changes(self, **changes: Any) -> Self:
         """These options with some of them changed; a tolerance replaces a scheme, and vice versa.
@@ -284,6 +286,24 @@ class PlanOptions:
         options = dataclasses.replace(self, **_withdrawn(changes), **changes)
         if not changes.keys() & set(_CLEARANCE_OPTIONS):  # keep its cached distances
             options.__dict__["clearance"] = self.clearance
+        return options
+
+    def decided(self, robot: Robot) -> Self:
+        """These options with self-collision kept, or not, for a robot with what it holds."""
+        if self.self_collision is not None:
+            return self
+        from hovi.planning.clearance.self_collisions import can_keep_apart  # 10 ms
+
+        kept = can_keep_apart(robot, tuple(self.clearance.may_touch))
+        return self.with_changes(self_collision=kept)
+
+    def leaving_out(self, pairs: Sequence[tuple[str, str]]) -> Self:
+        """These options with some pairs of links that are not kept apart."""
+        if not pairs:
+            return self
+        options = dataclasses.replace(self)
+        clearance = dataclasses.replace(self.clearance, left_out=pairs)
+        options.__dict__["clearance"] = clearance
         return options
 
     def on(self, scene: Scene) -> Self:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, ParamSpec, Protocol, cast
 
 from hovi.checks.arguments import check_arguments_except
@@ -13,8 +13,10 @@ from hovi.discrete.output.caution import COLLISION, LEFT_OUT, STATUS, WARNED, Ca
 from hovi.discrete.state import State, warn_of_degrees
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError, SceneError, expect, warn
-from hovi.planning.clearance.self_collisions import pairs_left_out
+from hovi.planning.clearance.hull_overlaps import HullOverlap, hull_overlaps, met_sentence
+from hovi.planning.clearance.self_collisions import not_looked_at, pairs_left_out
 from hovi.planning.problem.frame_goal import FrameGoal
+from hovi.planning.problem.goals import Via
 from hovi.planning.problem.limits import as_limits
 from hovi.planning.problem.notation.ends import End, as_end
 from hovi.planning.problem.presolve.assumptions import assumptions
@@ -132,7 +134,7 @@ def plan(
     if options.group is not None:
         scene, start_end, goal_end = in_group(scene, options.group, *given)
         given = start_end, goal_end
-    chosen = options.on(scene)
+    chosen, apart = kept_apart(options.on(scene), scene.robot, ends_of(*given, options.via))
     deadline = Deadline(chosen.time_limit_seconds)
     free, T = _time(scene, as_duration(duration), chosen)
     search = _Planning(scene, *given, T, chosen, free)
@@ -147,10 +149,12 @@ def plan(
         warn(sentence)
     if found.reason:
         nothing = infeasible_at_once(longest, chosen.guess, found.reason)
-        return with_notes(nothing, [job.scene], job.options, time.perf_counter() - began)
+        seconds = time.perf_counter() - began
+        return with_notes(nothing, [job.scene], job.options, apart, seconds)
     if fault := job.fault_of_time:
         nothing = unresolved_at_once(problem, chosen.guess, fault)
-        return with_notes(nothing, [job.scene], job.options, time.perf_counter() - began)
+        seconds = time.perf_counter() - began
+        return with_notes(nothing, [job.scene], job.options, apart, seconds)
     if FrameGoal in map(type, given):
         ends = chosen_ends(scene, *given, T, chosen, deadline)
         job = search.job(ends, deadline, job.scene if ends[0] is job.start else None)
@@ -159,20 +163,21 @@ def plan(
         loose = dataclasses.replace(search, options=chosen.with_changes(self_collision=False))
         without = loose.job((job.start, job.goal), deadline, job.scene)
     solution = run(Search(job, deadline, progress or silent, free, without), began)
-    return with_notes(solution, [job.scene], job.options)
+    return with_notes(solution, [job.scene], job.options, apart)
 
 
 def with_notes(
     found: Solution,
     scenes: Sequence[Scene],
     options: PlanOptions,
+    apart: Apart,
     setup_seconds: float | None = None,
 ) -> Solution:
     """The solution, with a message that ends with what was left unsaid, self-collision included.
 
-    scenes: of its segments; what one of them says is said.
+    scenes: of its segments; what one of them says is said. apart: see `kept_apart`.
     """
-    notes = list(_notes(found, scenes, options))
+    notes = [*_notes(found, scenes, options), *apart.cautions(found)]
     said = [each.sentence for each in notes if each.word in (LEFT_OUT, COLLISION)]
     cautions = notes if found.success else [Caution(STATUS, found.message), *notes]
     setup = found.setup_seconds if setup_seconds is None else setup_seconds
@@ -210,6 +215,53 @@ def run(search: Search, began: float) -> Solution:
         setup_seconds=started - began,
         solve_seconds=time.perf_counter() - started,
     )
+
+
+@dataclass(frozen=True, eq=False)
+class Apart:
+    """What is not kept apart.
+
+    overlaps: pairs of links that are left out. reason: why no links are, as a sentence.
+    """
+
+    overlaps: tuple[HullOverlap, ...] = ()
+    reason: str = ""
+
+    def cautions(self, found: Solution) -> Iterator[Caution]:
+        """What is said of it after a solution, and of a motion in which such a pair meets."""
+        if self.reason:
+            yield Caution(LEFT_OUT, self.reason)
+        for each in self.overlaps:
+            yield Caution(LEFT_OUT, str(each))
+            if found.status not in UNSEEN and (met := met_sentence(found.trajectory, each)):
+                yield Caution(COLLISION, met)
+
+
+def ends_of(
+    start: State | FrameGoal, goal: State | FrameGoal | None, via: Sequence[Via]
+) -> dict[str, State | FrameGoal | None]:
+    """The ends of a motion, by what they are in messages."""
+    stops = {f"the via point at {each.time:g} s": each.goal for each in via}
+    return {"the start": start, **stops, "the goal": goal}
+
+
+def kept_apart(
+    options: PlanOptions, robot: Robot, ends: Mapping[str, State | FrameGoal | None]
+) -> tuple[PlanOptions, Apart]:
+    """The options with self-collision decided, and what is not kept apart.
+
+    ends: by what they are, such as "the start"; configurations that are given wholly are looked at.
+    """
+    decided = options.decided(robot)
+    if not decided.self_collision:
+        return decided, Apart((), not_looked_at(robot) if options.self_collision is None else "")
+    whole = {
+        name: end.on(robot, name)[0]
+        for name, end in ends.items()
+        if isinstance(end, State) and not end.free
+    }
+    overlaps = hull_overlaps(robot, decided.clearance, whole)
+    return decided.leaving_out([each.links for each in overlaps]), Apart(overlaps)
 
 
 def holding(scene: Scene, options: PlanOptions) -> Scene:

@@ -17,7 +17,15 @@ from hovi.planning.search.group import in_group, with_others
 from hovi.planning.search.job import Acting
 from hovi.planning.search.option_fields import spell_out
 from hovi.planning.search.options import PlanOptions
-from hovi.planning.search.planner import holding, plan, run, warn_of_ends, with_notes
+from hovi.planning.search.planner import (
+    ends_of,
+    holding,
+    kept_apart,
+    plan,
+    run,
+    warn_of_ends,
+    with_notes,
+)
 from hovi.planning.search.search import Search
 from hovi.planning.sequence.branches import End
 from hovi.planning.sequence.segment import Segment, Table, checked_segments, goals_of, names_of
@@ -109,7 +117,10 @@ def plan_sequence(
     if len(parts) == 1:
         return _alone(scene, start, parts[0], progress, chosen)
     scene, begin, goals = _in_group(holding(scene, chosen), start, parts, chosen)
-    chosen, deadline = chosen.on(scene), Deadline(chosen.time_limit_seconds)
+    deadline = Deadline(chosen.time_limit_seconds)
+    names = (f"the goal of {name!r}" for name in names_of(parts))
+    stops = ends_of(begin, None, chosen.via) | dict(zip(names, goals, strict=True))
+    chosen, apart = kept_apart(chosen.on(scene), scene.robot, stops)
     job = job_of(scene, begin, goals, parts, chosen)
     job.problem()  # raises for invalid input before the search
     warn_of_ends(scene.robot, job.start, job.goal, job.options)
@@ -119,7 +130,7 @@ def plan_sequence(
         solution = unresolved_at_once(job.problem(), job.options.guess, fault)
     else:
         solution = run(Search(job, deadline, progress or silent, None, without), began)
-    return _named(with_notes(solution, scenes, job.options), parts)
+    return _named(with_notes(solution, scenes, job.options, apart), parts)
 
 
 def _alone(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import re
 import tomllib
 from collections.abc import Mapping, Sequence
@@ -29,7 +30,7 @@ from hovi.planning.task_file.scene_cache import (
     chosen,
     others,
 )
-from hovi.planning.task_file.schema import PLAIN, SchemeTable, ShapedTable, TaskTable
+from hovi.planning.task_file.schema import FORMAT, PLAIN, SchemeTable, ShapedTable, TaskTable
 from hovi.planning.task_file.segment_tables import check_keys, read_segments
 from hovi.planning.task_file.task import Task
 from hovi.robot.bundled_models import shipped_urdf
@@ -81,12 +82,13 @@ def task_of(data: Mapping[str, Any], toml: TomlText, cache: SceneCache | None = 
     )
     scene = kept.get("scene", chosen(data, SCENE_KEYS), lambda: _scene(table, robot, toml))
     start = read_end(table.start, ("start",), held, toml)
-    begin = Begin(table.group, start)
+    begin, note = Begin(table.group, start), _note(table, robot, toml)
     if table.segments:
         segments = read_segments(table.segments, held, toml, begin)
         whole = sum(each.duration for each in segments)
         options = _options(table, whole, held, grasped, toml)
-        return Task.of_segments(scene, start, segments, options, name)
+        task = Task.of_segments(scene, start, segments, options, name)
+        return dataclasses.replace(task, note=note)
     assert table.goal is not None
     duration = _duration(table.duration, toml)
     goal = read_end(table.goal, ("goal",), held, toml, begin)
@@ -96,7 +98,7 @@ def task_of(data: Mapping[str, Any], toml: TomlText, cache: SceneCache | None = 
         others(data, without),
         lambda: _options(table, duration, held, grasped, toml),
     )
-    return Task(scene, start, goal, duration, options, name)
+    return Task(scene, start, goal, duration, options, name, note=note)
 
 
 def _options(
@@ -110,8 +112,11 @@ def _options(
 
     robot: with what it holds.
     """
+    plain = {name: getattr(table, name) for name in PLAIN}
+    if meets(table):
+        plain["self_collision"] = False
     try:
-        options = PlanOptions(**{name: getattr(table, name) for name in PLAIN}, grasped=grasped)
+        options = PlanOptions(**plain, grasped=grasped)
     except InputError as wrong:
         key = next((name for name in PLAIN if _is_about(wrong, name)), "")
         raise toml.error((key,), str(wrong)) from None
@@ -127,6 +132,21 @@ def _options(
         obstacles=_obstacles(table, options, robot, toml),
         tolerance=tolerance,
         group=table.group,
+    )
+
+
+def meets(table: ShapedTable) -> bool:
+    """Whether links of a file may meet since it is of format 1 and says nothing of it."""
+    return table.format == 1 and getattr(table, "self_collision", None) is None
+
+
+def _note(table: ShapedTable, robot: Robot, toml: TomlText) -> str:
+    """What is assumed of a file of format 1 whose robot has collision shapes; "" for others."""
+    if not (meets(table) and "<collision" in (robot.source.urdf or "")):
+        return ""
+    return (
+        f"{toml.path.name} has no `format`, so links may meet, as in format 1: write `format = "
+        f"{FORMAT}` to keep them apart, or self_collision = false."
     )
 
 

@@ -25,6 +25,10 @@ from hovi.planning.problem.units import DURATION_IN_WORDS, SECONDS_IN_WORDS
 from hovi.planning.search.option_fields import SceneKey, option_infos
 from hovi.planning.search.options import MAX_INTERVALS, PlanOptions
 
+FORMAT = 2
+"""The format of scene files. In files of format 1, without that key, links may meet unless
+`self_collision` is said."""
+
 
 def _kind(value: object) -> str:
     if isinstance(value, dict):
@@ -243,6 +247,9 @@ class GraspedTable(Table):
 class ShapedTable(Table):
     """The keys of a file except for the options that are single values."""
 
+    format: int = Field(
+        default=1, ge=1, le=FORMAT, description=f"a whole number from 1 to {FORMAT}"
+    )
     robot: str = Field(
         description="the path of a .urdf relative to this file, or a name of example-robot-data"
     )
@@ -309,6 +316,7 @@ PLAIN: dict[str, SceneKey] = {
 _KINDS: dict[str, Any] = {
     "time_limit": PositiveSeconds | None,
     "guess": str,
+    "self_collision": bool | None,
 }
 """Types of options that the type of their default does not tell."""
 

@@ -40,6 +40,7 @@ class Task(Summarized):
     options: of the plan; `with_options` changes some of them.
     name: of the task in reports.
     segments: of a sequence, as for `hovi.plan_sequence`: see `of_segments`.
+    note: what is assumed of its file, as a sentence; it is said when the task is planned.
     Raises InputError for an invalid duration and for options that do not fit the robot.
     """
 
@@ -50,6 +51,7 @@ class Task(Summarized):
     options: PlanOptions = field(default_factory=PlanOptions)
     name: str = "task"
     segments: tuple[Segment, ...] = ()
+    note: str = ""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "duration", as_duration(self.duration))
@@ -133,4 +135,5 @@ class Task(Summarized):
 
         changes: as for PlanOptions. Raises InputError for an unknown option.
         """
-        return dataclasses.replace(self, options=self.options.with_changes(**changes))
+        note = "" if "self_collision" in changes else self.note
+        return dataclasses.replace(self, options=self.options.with_changes(**changes), note=note)

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import dataclasses
 from typing import Any
 
 from hovi.checks.arguments import check_arguments
+from hovi.discrete.output.caution import LEFT_OUT, Caution
+from hovi.planning.refinement.faults.cautions import with_cautions_of_motion
 from hovi.planning.search.planner import plan
 from hovi.planning.solver.solver import Solution
 from hovi.planning.task_file.task import Task
@@ -20,6 +23,15 @@ def plan_task(task: Task, progress: Progress | None = None, **changes: Any) -> S
     changes: options that override those of the task.
     Raises as `plan` does.
     """
+    found = _planned(task, progress, **changes)
+    note = "" if "self_collision" in changes else task.note
+    if not note:
+        return found
+    found = dataclasses.replace(found, message=f"{found.message} {note}")
+    return with_cautions_of_motion(found, [Caution(LEFT_OUT, note)])
+
+
+def _planned(task: Task, progress: Progress | None, **changes: Any) -> Solution:
     if task.segments:
         from hovi.planning.sequence.sequence_planner import plan_sequence  # rarely needed
 

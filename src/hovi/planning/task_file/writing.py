@@ -18,7 +18,7 @@ from hovi.planning.task_file.effect_tables import effect_table
 from hovi.planning.task_file.goal_tables import end_table, via_table
 from hovi.planning.task_file.limit_tables import limits_value
 from hovi.planning.task_file.obstacle_tables import obstacle_table
-from hovi.planning.task_file.schema import PLAIN
+from hovi.planning.task_file.schema import FORMAT, PLAIN
 from hovi.planning.task_file.segment_tables import segments_value
 from hovi.planning.task_file.task import Task
 from hovi.robot.example_robots import example_robot
@@ -56,6 +56,7 @@ def _document(task: Task, folder: Path) -> tomlkit.TOMLDocument:
     """The task as TOML, in which tables come after plain keys."""
     robot = task.scene.robot
     keys = {
+        "format": FORMAT,
         **_robot_keys(task, folder),
         "duration": None if task.segments else _duration(task.duration),
         **_option_keys(task, folder),

@@ -17,7 +17,7 @@ MAX_CELLS = 100_000_000
 """Maximum number of cells."""
 OWN_GUESS_SPACING = 4
 """Every how many cells along each axis one starts from its own guess, too."""
-FORMAT = 1
+FORMAT = 2
 """Of what is hashed; to be raised whenever equal scenes would be planned differently."""
 
 

@@ -233,7 +233,8 @@ def _guesses(task: Task, job: CellJob, desk: _Desk) -> list[tuple[str, Trajector
 
 def _met(task: Task, target: FrameGoal, other: State | FrameGoal) -> State:
     """At rest where a frame meets its target, as near to the other end as was found."""
-    robot, options = task.held_scene.robot, task.options
+    robot = task.held_scene.robot
+    options = task.options.decided(robot)
     near = None
     if isinstance(other, State):
         near = other.resolved(robot, "the other end").on(robot, "it")[0]
@@ -244,7 +245,7 @@ def _met(task: Task, target: FrameGoal, other: State | FrameGoal) -> State:
         limits=options.limits,
         obstacles=options.obstacles,
         margin=options.margin,
-        self_collision=options.self_collision,
+        self_collision=bool(options.self_collision),
     )
     return State(found[0])
 

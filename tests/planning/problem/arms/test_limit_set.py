@@ -245,7 +245,9 @@ def test_a_plan_holds_them_at_samples_of_its_own(name: str) -> None:
     example, start, goal, duration = MOVES[name]
     robot = hovi.load_robot(example, locked=FINGERS if example == "panda" else [])
     scene = hovi.Scene(robot, [hovi.effects.Gravity(), hovi.effects.Armature(1.0)])
-    found = hovi.plan(scene, start, goal, duration=duration, limits=name, intervals=16)
+    found = hovi.plan(
+        scene, start, goal, duration=duration, limits=name, intervals=16, self_collision=False
+    )
     assert found.success, found.message
     arm = SETS[name]
     kinds = arm.limits.keys() - set(arm.beyond(2))
@@ -264,7 +266,9 @@ def test_a_smooth_plan_holds_those_on_jerk_and_torque_rate_too(name: str) -> Non
     start, goal, duration = SMOOTH[name]
     robot = hovi.load_robot(name, locked=FINGERS if name == "panda" else [])
     scene = hovi.Scene(robot, [hovi.effects.Gravity()])
-    found = hovi.plan(scene, start, goal, duration=duration, limits=name, smooth=True)
+    found = hovi.plan(
+        scene, start, goal, duration=duration, limits=name, smooth=True, self_collision=False
+    )
     assert found.success, found.message
     values, arm = reached(robot, found.trajectory, 0.0), SETS[name]
     room = least_room(values, arm, arm.limits)

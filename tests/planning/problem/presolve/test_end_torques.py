@@ -155,4 +155,4 @@ def test_a_frame_goal_that_cannot_be_held_is_told_with_what_smooth_asks(
     goal = hovi.FrameGoal("tool0", position=[0.85, 0.1, 0.1])
     given = {"smooth": smooth, "limits": "urdf", "time_limit": 0.5}
     with pytest.warns(hovi.errors.HoviWarning, match=what):
-        hovi.plan(scene, REST, goal, 2.0, **given)
+        hovi.plan(scene, REST, goal, 2.0, **given, self_collision=False)

@@ -433,8 +433,10 @@ def planned(task: Mapping[str, Any]) -> hovi.Solution:
     robot, effects = hovi.load_robot(rest.pop("robot"), free_flyer=free), rest.pop("effects")
     scene, start = hovi.Scene(robot, effects), rest.pop("start")
     if "segments" in rest:
-        return hovi.plan_sequence(scene, start, rest.pop("segments"), **rest)
-    return hovi.plan(scene, start, rest.pop("goal"), rest.pop("duration"), **rest)
+        return hovi.plan_sequence(scene, start, rest.pop("segments"), **rest, self_collision=False)
+    return hovi.plan(
+        scene, start, rest.pop("goal"), rest.pop("duration"), **rest, self_collision=False
+    )
 
 
 def sentences(task: Mapping[str, Any]) -> tuple[str, list[str], str]:

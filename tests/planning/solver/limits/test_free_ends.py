@@ -44,7 +44,7 @@ def test_what_an_end_leaves_free_is_within_the_limits(
     scene: hovi.Scene, free: dict[str, list[str]], at_goal: bool
 ) -> None:
     ends = (HOME, hovi.State(GOAL, **free)) if at_goal else (hovi.State(HOME, **free), GOAL)
-    assert_within_limits(hovi.plan(scene, *ends, 1.5, **GIVEN))
+    assert_within_limits(hovi.plan(scene, *ends, 1.5, **GIVEN, self_collision=False))
 
 
 @pytest.mark.parametrize("free", FREE, ids=str)
@@ -52,7 +52,7 @@ def test_ends_become_free_and_are_given_again_in_a_replan(
     scene: hovi.Scene, free: dict[str, list[str]]
 ) -> None:
     """With other control points than the motion from which it starts."""
-    solution = hovi.plan(scene, HOME, GOAL, 1.5, **GIVEN)
+    solution = hovi.plan(scene, HOME, GOAL, 1.5, **GIVEN, self_collision=False)
     freed = solution.replan(goal=hovi.State(GOAL, **free))
     assert_within_limits(freed)
     assert freed.cost < solution.cost

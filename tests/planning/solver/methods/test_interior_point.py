@@ -83,6 +83,7 @@ def test_limits_hold_at_ten_thousand_samples(models: Path, name: str) -> None:
         scheme=task.options.scheme,
         intervals=task.options.intervals,
         limits=task.options.limits,
+        self_collision=False,
     )
     assert solution.status is Status.MINIMUM, solution.message
     assert solution.n_neg == 0
@@ -190,7 +191,7 @@ def test_light_wrists_hold_their_velocity_limits_at_the_ends() -> None:
     robot = hovi.load_robot("z1", locked=["jointGripper"])
     scene = hovi.Scene(robot, [hovi.effects.Gravity()])
     start = State([1.0, 1.5, -1.5, 0.5, -0.5, 2.0])
-    solution = plan(scene, start, [-1.0, 0.5, -0.5, -0.5, 0.5, -2.0], 3.0)
+    solution = plan(scene, start, [-1.0, 0.5, -0.5, -0.5, 0.5, -2.0], 3.0, self_collision=False)
     assert solution.success, solution.message
     assert largest_excess(solution.trajectory, as_limits(robot, "urdf")) <= 1e-6
 
@@ -203,7 +204,7 @@ def test_a_guess_that_fails_on_the_halved_grid_is_restored_there_too(intervals: 
     start = [0.499, 0.422, -0.098, 1.096, 1.342, 0.104]
     goal = [2.832, 1.647, -0.522, 1.966, 0.367, -0.201]
     options = {"intervals": intervals, "continuation": False}
-    solution = plan(scene, start, goal, 1.9125, **options)
+    solution = plan(scene, start, goal, 1.9125, **options, self_collision=False)
     assert solution.success, solution.message
     assert largest_excess(solution.trajectory, as_limits(robot, "urdf")) <= 1e-6
 
@@ -215,7 +216,7 @@ def test_a_light_wrist_at_the_iteration_limit_is_refined_to_a_minimum() -> None:
     scene = hovi.Scene(robot, [hovi.effects.Gravity()])
     start = [-2.028, -0.447, -2.746, 2.798, -2.59, 0.217, 2.347]
     goal = [-0.174, 1.731, 1.671, 3.578, -2.341, -1.337, -2.7]
-    solution = plan(scene, start, goal, 4.822, continuation=False)
+    solution = plan(scene, start, goal, 4.822, continuation=False, self_collision=False)
     assert solution.success, solution.message
     assert largest_excess(solution.trajectory, as_limits(robot, "urdf")) <= 1e-6
 

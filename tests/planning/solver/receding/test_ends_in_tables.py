@@ -22,7 +22,15 @@ HAND = [0.45, 0.25, 0.35]
 def planned() -> hovi.Solution:
     robot = hovi.load_robot("ur5")
     scene = hovi.Scene(robot, [hovi.effects.Gravity()])
-    return hovi.plan(scene, [0.0, -1.2, 1.2, -0.5, 0.3, 0.1], Q, 1.5, limits="none", intervals=8)
+    return hovi.plan(
+        scene,
+        [0.0, -1.2, 1.2, -0.5, 0.3, 0.1],
+        Q,
+        1.5,
+        limits="none",
+        intervals=8,
+        self_collision=False,
+    )
 
 
 def by_joint(robot: hovi.Robot, q: list[float]) -> dict[str, float]:
@@ -91,7 +99,7 @@ def test_what_is_no_goal_gets_the_sentence_of_plan(
         planned.replan(goal=wrong)
     assert planned.problem is not None
     with pytest.raises(InputError) as by_plan:
-        hovi.plan(planned.problem.scene, Q, wrong, 1.5)
+        hovi.plan(planned.problem.scene, Q, wrong, 1.5, self_collision=False)
     assert str(told.value) == str(by_plan.value)
 
 
