@@ -657,7 +657,7 @@ SCENES = {
     "unknown scheme": ("galerkin-2", "galerkin-two", ["'galerkin-2'"]),
     "unit": ("duration", 'tolerance = "1 mmm"\nduration', ["tolerance", "'mm'", "line"]),
     "degenerate scheme": ("galerkin-2", "mean-difference", ["mean-difference"]),
-    "unknown key": ("intervals =", "intervalls =", ["'intervals'", "line 18"]),
+    "unknown key": ("intervals =", "intervalls =", ["'intervals'", "line 17"]),
 }
 
 

@@ -15,6 +15,7 @@ from hovi.errors import InputError, UnreachableError, expect
 from hovi.planning.clearance.clearance import DEFAULT_MARGIN, Clearance
 from hovi.planning.clearance.clearance_violation import distance_in_words
 from hovi.planning.clearance.distances import Distances, distances_between
+from hovi.planning.clearance.self_collisions import can_keep_apart
 from hovi.planning.obstacles.obstacle import Obstacle
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.kinematics.branches import Branches, find_branches
@@ -59,7 +60,7 @@ def inverse_kinematics(
     limits: str | Limits | Mapping[str, Any] = "urdf",
     obstacles: Sequence[Obstacle | Mapping[str, Any]] = (),
     margin: float = DEFAULT_MARGIN,
-    self_collision: bool = False,
+    self_collision: bool | None = False,
     most: int = MOST,
     seeds: int = SEEDS,
 ) -> Array:
@@ -78,7 +79,8 @@ def inverse_kinematics(
         begins; by default the goal's guess, or the middle of the joints' ranges, 0 for joints
         without or with full turns.
     limits: as for `plan`; only those on q count.
-    obstacles, margin, self_collision: as for `plan`; configurations that come closer are left out.
+    obstacles, margin, self_collision: as for `plan`, but links may meet by default; configurations
+        that come closer are left out.
     most: number of configurations at which the search ends.
     seeds: number of configurations from which it starts, at most.
     Raises UnreachableError, with the nearest configuration, if none is found; InputError.
@@ -90,7 +92,8 @@ def inverse_kinematics(
     assert isinstance(goal, FrameGoal)
     goal.check(robot)
     most, seeds = _count("most", most), _count("seeds", seeds)
-    clearance = _clearance_of(obstacles, margin, self_collision)
+    both = can_keep_apart(robot) if self_collision is None else self_collision
+    clearance = _clearance_of(obstacles, margin, both)
     bounds = position_bounds(robot, limits)
     first = first_configuration(robot, goal, near, bounds)
     return configurations(robot, goal, first, bounds, clearance, most, seeds)

@@ -37,7 +37,8 @@ def arm(radius: float = RADIUS) -> hovi.Robot:
 
 def planned(robot: hovi.Robot, goal: list[float], **options: object) -> hovi.Solution:
     scene = hovi.Scene(robot, [hovi.effects.Gravity()])
-    return hovi.plan(scene, STRETCHED, goal, 1.0, limits="none", intervals=8, **options)
+    options = {"limits": "none", "intervals": 8, "self_collision": False} | options
+    return hovi.plan(scene, STRETCHED, goal, 1.0, **options)
 
 
 def gap(q: np.ndarray) -> float:
@@ -70,7 +71,9 @@ def test_links_that_overlap_all_the_time_are_not_told() -> None:
 def test_a_sequence_tells_it_too() -> None:
     scene = hovi.Scene(arm(), [hovi.effects.Gravity()])
     segments = [{"goal": FOLDED, "duration": 1.0}, {"goal": STRETCHED, "duration": 1.0}]
-    found = hovi.plan_sequence(scene, STRETCHED, segments, limits="none", intervals=8)
+    found = hovi.plan_sequence(
+        scene, STRETCHED, segments, limits="none", intervals=8, self_collision=False
+    )
     assert "'l0' and 'l2' into each other" in found.message
 
 
