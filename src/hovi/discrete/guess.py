@@ -126,18 +126,20 @@ def with_bump(
 def with_turns(base: Curve, coordinates: Coordinates, duration: float, turns: Array) -> Curve:
     """A curve plus full turns, distributed over the duration by a cubic at rest at both ends.
 
+    base: the curve, up to the jerk on commutative groups.
     turns: rotation vectors over 2 pi in the tangent space, shape (nv,): see `State.turns_on`.
     duration: T, in [s].
     """
     angle = 2 * np.pi * turns
 
-    def curve(t: Array) -> tuple[Array, Array, Array]:
+    def curve(t: Array) -> tuple[Array, ...]:
         s = np.asarray(t)[:, None] / duration
         x, dx, ddx = s**2 * (3 - 2 * s), 6 * s * (1 - s) / duration, (6 - 12 * s) / duration**2
-        q, v, a = base(t)
-        return coordinates.chart.composed(
+        q, v, a, *jerk = base(t)
+        moved = coordinates.chart.composed(
             (q, v, a), _modulo_period(coordinates, x * angle), dx * angle, ddx * angle
         )
+        return (*moved, *(each - 12 * angle / duration**3 for each in jerk))
 
     return curve
 

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
+from contextlib import suppress
 from itertools import chain
 
 import numpy as np
 
 from hovi.discrete.grid import DiscretePath
 from hovi.discrete.guess import stretched, with_bump
+from hovi.errors import ChartError
 from hovi.optimize.barrier import Barrier
 from hovi.optimize.bounded_objective import STOPPED, Outputs
 from hovi.optimize.trust_region import Stop, minimize
@@ -30,6 +32,8 @@ SAME_VIOLATION = 1.5
 """Ratio of the squares up to which two minima of the violation are taken as one."""
 BUMP_SHARE = 0.3
 """Share of a perturbation of the guess that keeps it near enough for few steps."""
+BUMP_HALVINGS = 8
+"""Number of shares of a perturbation, each half of the one before, that charts are tried with."""
 SMALL_VIOLATION = 1e-3
 """Violation, as a share of the range, below which the interior point is tried again."""
 
@@ -114,10 +118,15 @@ def _without_forces(
 
 
 def _bumped_guess(search: BoundedSearch, seed: int, share: float = 1.0) -> DiscretePath:
+    """The guess with a bump, of a smaller share where it turns too far for a chart."""
     problem = search.problem
     T = problem.grid.duration
     base = stretched(problem.trajectory(search.guess), T, problem.ld.k)
-    return problem.path(with_bump(base, problem.coordinates, T, seed, share))
+    for halvings in range(BUMP_HALVINGS):
+        bump = with_bump(base, problem.coordinates, T, seed, share * 0.5**halvings)
+        with suppress(ChartError):
+            return problem.path(bump)
+    return search.guess
 
 
 def _penalized(
