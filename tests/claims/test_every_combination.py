@@ -7,13 +7,27 @@ one sentence, or a status that says why there is none.
 from __future__ import annotations
 
 import traceback
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import hovi
-from samples.combinations import AXES, GROUPS, LEFT_OUT, REFUSED, carried_out, effects_of, two_link
+from samples.asked_motions import (
+    AXES,
+    GROUPS,
+    LEFT_OUT,
+    REFUSED,
+    Array,
+    Asked,
+    effects_of,
+    planned,
+    two_link,
+)
+from samples.combinations import carried_out
+from samples.motion_judge import judged
 from samples.pairwise import Case, Pair, all_pairs, pairs_of, pairwise
 
 pytestmark = pytest.mark.filterwarnings("ignore::hovi.errors.HoviWarning")
@@ -82,3 +96,26 @@ def test_every_pair_of_single_effects_too(robot: str, seed: int, tmp_path: Path)
     wrong, motions = failures(cases, tmp_path)
     assert not wrong, "\n".join(wrong)
     assert motions >= len(cases) / 2
+
+
+@dataclass(frozen=True)
+class Slow(Asked):
+    """With a bound on velocities that the motion does not keep."""
+
+    @property
+    def bounds(self) -> Iterator[tuple[str, Array, Array]]:
+        yield "v", np.full(3, -0.1), np.full(3, 0.1)
+
+
+def test_the_judge_notices_what_a_motion_does_not_satisfy() -> None:
+    """The motion of one case, judged as that of another."""
+    asked = Asked(USUAL)
+    found = planned(asked)
+    assert judged(asked, found) == ""
+    for axis, value in {"goal": "state", "via": "configuration", "effect": "nothing"}.items():
+        word = {"effect": "torques"}.get(axis, axis)
+        assert judged(Asked(USUAL | {axis: value}), found).startswith(f"{word}: ")
+    assert judged(Slow(USUAL), found).startswith("limits: v")
+    assert judged(asked, found, start=(asked.q0 + 1e-4, np.zeros(3))).startswith("start: ")
+    assert judged(asked, found, goal=asked.q1 + 1e-4).startswith("goal: ")
+    assert judged(asked, found, elapsed=0.1).startswith("duration: ")

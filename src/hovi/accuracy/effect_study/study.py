@@ -126,8 +126,8 @@ def study_effects(
         started when time is up. By default a candidate is planned in at most ten times the time
         of the task, at least 10 s. A KeyboardInterrupt ends the study with the trials so far.
     A candidate that fails is among `failed`, and the others are tried.
-    Raises SceneError when no motion of the task itself is found, and InputError for a candidate at
-    a frame that cannot move.
+    Raises SceneError when no motion of the task itself is found and, before it is looked for, for a
+    candidate that the robot cannot have, and InputError for one at a frame that cannot move.
     """
     task.require_one_motion("a study of effects")
     report = progress or silent
@@ -136,6 +136,7 @@ def study_effects(
         effect_candidates(scene.robot, scene.passive) if candidates is None else candidates
     )
     check_frames_move(scene.robot, tried)
+    scenes = [_with_or_without(scene, effect) for effect in tried]
     began = time.perf_counter()
     report("planning the unchanged scene", 0.0)
     solution = _plan(task, task.scene, "cubic", task.options.starts, deadline.seconds_left)
@@ -148,7 +149,6 @@ def study_effects(
     began = time.perf_counter()
     _plan(task, task.scene, solution.trajectory, 1)
     replan_seconds = time.perf_counter() - began
-    scenes = [_with_or_without(scene, effect) for effect in tried]
     own_error = _tip_error(solution, default_limit)
     own_seconds, *times = seconds_per_point([scene, *scenes])
     trials, failed = list[EffectTrial](), list[FailedTrial]()
