@@ -104,6 +104,20 @@ def turns(motion: hovi.Trajectory) -> npt.NDArray[np.float64]:
     return np.asarray(motion.duration * v / (np.pi + np.abs(motion.q[-1] - motion.q[0])))
 
 
+def test_links_that_enter_each_other_are_named_and_warned_of(tmp_path: Path) -> None:
+    arm = hovi.load_robot("panda", locked=["panda_finger_joint1", "panda_finger_joint2"])
+    folded = [0.0, 1.7, 0.0, -3.05, 0.0, 0.5, 0.0]
+    solution = hovi.plan(hovi.Scene(arm), "default", folded, 2.0, self_collision=False)
+    assert solution.success
+    first = solution.trajectory.cautions[0]
+    assert re.search(r"links 'panda_\w+' and 'panda_\w+' into each other, by 0.\d+ m", first)
+    solution.trajectory.save(tmp_path / "motion.npz")
+    again = hovi.Trajectory.load(tmp_path / "motion.npz")
+    assert again.cautions[0] == first
+    with pytest.warns(HoviWarning, match="into each other"):
+        hovi.export(again, tmp_path / "motion.csv", rate=20.0)
+
+
 def test_the_limits_that_were_left_out_are_named_where_they_are_exceeded(
     motion: hovi.Trajectory,
 ) -> None:

@@ -28,6 +28,7 @@ def test_the_index_of_a_stationary_motion_is_that_of_its_conjugate_points(
     assert held.n_neg == held.trajectory.metadata["n_neg"] == index
     assert held.success == (index == 0)
     assert held.status == ("minimum" if index == 0 else "saddle")
+    assert held.minima == ((held.cost,) if index == 0 else ())
     sought = hovi.solve(problem, seek="stationary")
     assert sought.n_neg == index
     assert sought.success

@@ -161,7 +161,7 @@ def test_a_motion_that_comes_too_close_is_unusable_by_however_little(
     solution = hovi.plan(ball, [-1.3], [1.2], 1.0, **options)
     assert solution.success
     margins = solution.margins()
-    assert margins.distance == pytest.approx(least, abs=1e-4)
+    assert margins.distance == pytest.approx(least, abs=1e-6)
     assert margins.nearest_pair is not None
     assert "near" in margins.nearest_pair
     assert "arm" in margins.nearest_pair

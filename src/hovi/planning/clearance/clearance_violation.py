@@ -53,6 +53,13 @@ def approach_along(
     return _refined(trajectory, distances, nearest, at, least + REFINEMENT_DISTANCE)
 
 
+def closest_along(trajectory: Trajectory, distances: Distances, least: float) -> Approach:
+    """As `approach_along`, refined where they are near the least of all, too."""
+    nearest, at = _nearest(*_sampled(trajectory, distances, np.inf))
+    first = float((nearest - distances.allowance).min())
+    return _refined(trajectory, distances, nearest, at, max(least, first) + REFINEMENT_DISTANCE)
+
+
 def near_pairs(trajectory: Trajectory, distances: Distances, least: float) -> npt.NDArray[np.intp]:
     """Numbers of the pairs that come nearer than `least`, in [m], anywhere along a motion."""
     below = least + REFINEMENT_DISTANCE

@@ -23,7 +23,7 @@ from hovi.discrete.output.caution import caution_lines
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import DisplayError, HoviError, expect
 from hovi.flows.execution.dynamics_replay import DynamicsReplay, replay_dynamics
-from hovi.planning.clearance.clearance_violation import approach_along
+from hovi.planning.clearance.clearance_violation import closest_along
 from hovi.planning.problem.limit_violation import closeness
 from hovi.planning.problem.limits import KINDS
 from hovi.scene.scene import Scene
@@ -166,7 +166,7 @@ def _margins(trajectory: Trajectory) -> Iterator[Row]:
                 )
     if kept is not None:
         clearance, distances = kept
-        found = approach_along(trajectory, distances, clearance.margin)
+        found = closest_along(trajectory, distances, clearance.margin)
         least = float((found.distance - distances.allowance).min())
         yield "least distance", f"{least:.4g} m (margin {clearance.margin:g} m)"
 

@@ -13,7 +13,7 @@ from hovi.checks.arguments import check_arguments
 from hovi.discrete.measures.segment_spans import segment_spans
 from hovi.discrete.trajectory import Trajectory
 from hovi.planning.clearance.clearance import Clearance
-from hovi.planning.clearance.clearance_violation import approach_along
+from hovi.planning.clearance.clearance_violation import closest_along
 from hovi.planning.clearance.distances import Distances, distances_between
 from hovi.planning.problem.limit_violation import AT_LIMIT, excess_along
 from hovi.planning.problem.limits import KINDS, Limits
@@ -164,7 +164,7 @@ def nearest_pair(
     motion: Trajectory, clearance: Clearance, distances: Distances
 ) -> tuple[float, str]:
     """The least distance, as `least_distance`, and the pair at which it occurs, in words."""
-    approach = approach_along(motion, distances, clearance.margin)
+    approach = closest_along(motion, distances, clearance.margin)
     closest = (approach.distance - distances.allowance).min(axis=0)
     pair = int(np.argmin(closest))
     return float(closest[pair]), str(dataclasses.replace(distances.pairs[pair], touching=False))
