@@ -7,11 +7,13 @@ pin.rnea and effects in NumPy.
 
 from __future__ import annotations
 
+import dataclasses
 import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
+import casadi as ca
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -302,6 +304,39 @@ def test_replanned_motions_are_looked_at_again() -> None:
     again = found.replan(goal=[1.4, 0.8])
     assert_honest(case, again)
     assert not again.success
+
+
+def test_a_pulse_in_a_segment_of_a_sequence_is_paid_for() -> None:
+    case, end = pulse(1.1, 1e-4), 0.8
+    scene = hovi.Scene(ROBOT, [E.Gravity(GRAVITY)])
+    segments = [
+        hovi.Segment([0.2, 0.5], end),
+        hovi.Segment(GOAL, T - end, effects=[case.effect]),
+    ]
+    options = {"limits": "none", "self_collision": False}
+    found = hovi.plan_sequence(scene, START, segments, **options)
+    assert found.success
+    assert_honest(case, found)
+    assert not hovi.plan_sequence(scene, START, segments, intervals=20, **options).success
+
+
+def test_motions_in_a_scene_of_pulses_are_replanned_on_their_nodes() -> None:
+    case = pulse(0.7123, 1e-4)
+    again = planned(case).replan(goal=[1.4, 0.8])
+    assert again.success
+    assert_honest(case, again)
+
+
+def test_an_expression_without_bounds_is_said_to_be_sampled() -> None:
+    case = cost("cost in q", shoulder, "q['shoulder']", 0.1, 1e-3, 6e4)
+    formula = E.CasadiCost(lambda q, v, a, tau, t: 6e4 * ca.exp(-(((q[0] - 0.1) / 1e-3) ** 2)))
+    unbounded = E.CasadiCost(lambda q, v, a, tau, t: ca.erf(q[0] / 0.3) ** 2)
+    thin = planned(dataclasses.replace(case, effect=formula), intervals=16)
+    assert not thin.success
+    assert "has no bounds" not in thin.message
+    smooth = planned(dataclasses.replace(case, effect=unbounded))
+    assert smooth.success
+    assert "Between 2,000 instants effect 'casadi_cost' has no bounds" in smooth.message
 
 
 @pytest.mark.long

@@ -42,6 +42,11 @@ class Bounds:
     calm: Mask
     jumps: Mask
 
+    def chosen(self, which: Mask) -> Bounds:
+        """Those over some of the boxes."""
+        at = self.lower[which], self.upper[which]
+        return Bounds(*at, self.calm[which], self.jumps[which])
+
     @property
     def width(self) -> Array:
         """upper - lower, shape (P, m); infinite where nothing is known."""

@@ -47,8 +47,12 @@ class Run:
 
 def _hull(*corners: Array) -> Bound:
     """The bounds of values; 0 for products of 0 and infinity."""
-    values = [np.where(np.isnan(x), 0.0, x) for x in corners]
-    return np.minimum.reduce(values), np.maximum.reduce(values)
+    low, high = corners[0], corners[0]
+    for x in corners[1:]:
+        low, high = np.minimum(low, x), np.maximum(high, x)
+    if np.isnan(low).any():  # of one corner
+        return _hull(*(np.where(np.isnan(x), 0.0, x) for x in corners))
+    return low, high
 
 
 def _add(run: Run, x: Bound, y: Bound) -> Bound:

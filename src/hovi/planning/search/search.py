@@ -11,6 +11,7 @@ from hovi.errors import InputError
 from hovi.planning.clearance.clearance_violation import near_pairs
 from hovi.planning.paths.first_guesses import FirstGuesses, first_guesses
 from hovi.planning.refinement.error_estimate import with_metadata
+from hovi.planning.refinement.faults.narrow_features import NARROW
 from hovi.planning.refinement.hp_refinement import galerkin_with_more_points
 from hovi.planning.refinement.resolution import Resolution, resolved, unresolved_if_whirling
 from hovi.planning.refinement.whirling import whirl_without_minimum
@@ -25,13 +26,7 @@ from hovi.planning.search.final_stages import (
 )
 from hovi.planning.search.free_duration import FreeDuration
 from hovi.planning.search.job import Job, split_for_charts
-from hovi.planning.search.multistart import (
-    Exploration,
-    Pool,
-    default_processes,
-    distinct,
-    explore,
-)
+from hovi.planning.search.multistart import Exploration, Pool, default_processes, explore
 from hovi.planning.solver.initial_path import guess_path
 from hovi.planning.solver.methods.active_pairs import with_clearance
 from hovi.planning.solver.solver import Solution
@@ -169,8 +164,20 @@ class Search:
                 return [_noting_cheaper(checked), *found[i + 1 :]]
             if self.deadline.passed or interrupted():
                 break
-        best = checked[0]
+        best = self._seeing_features(found[0], checked[0])
         return [best if self.fine.tolerance is None else unresolved_if_whirling(best)]
+
+    def _seeing_features(self, solution: Solution, refused: Solution) -> Solution:
+        """A motion that was refused for narrow features of effects, on a grid that sees them.
+
+        refused: the solution with the reason. It is kept where there is no such motion.
+        """
+        tolerance = self.fine.tolerance
+        if tolerance is None or self.free is not None or NARROW not in refused.message:
+            return refused
+        stages = FinalStages(self.fine, self.deadline, self.progress)
+        seen = stages.seeing_features(tolerance, solution)
+        return refused if seen is solution else resolved(seen)
 
     def _with_duration(self, refused: Solution) -> Solution:
         """The solution, which says its duration if that is free, also where a check refused it."""
@@ -237,10 +244,7 @@ class Search:
         yield (found := self._continued(job, found))
         if self.fine.tolerance is not None and self.free is None:
             raise_if_interrupted()
-            found = stages.to_tolerance(self.fine.tolerance, found)
-            yield found
-            seen = stages.seeing_features(self.fine.tolerance, found[0])
-            yield (found := found if seen is found[0] else distinct([seen, *found[1:]]))
+            yield (found := stages.to_tolerance(self.fine.tolerance, found))
         elif job is not self.fine:
             raise_if_interrupted()
             on_grid = stages.to_requested_grid(found, self.free is not None)

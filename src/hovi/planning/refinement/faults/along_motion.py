@@ -1,6 +1,6 @@
 """The cost along a motion with all narrow features of its effects, however few points a grid has.
 
-Time is bisected until the effects are bounded to change little in every part, see `Enclosure`, and
+Time is split until the effects are bounded to change little in every part, see `Enclosure`, and
 Gauss points in the parts integrate the Lagrangian.
 """
 
@@ -17,7 +17,7 @@ from hovi.discrete.trajectory import Trajectory
 from hovi.effects.expressions.interval_rules import Array, Bound
 from hovi.effects.expressions.time_parts import TimePart, from_line
 from hovi.planning.problem.presolve.formulas_of_time import base_parts
-from hovi.planning.refinement.faults.effect_bounds import effect_bounds
+from hovi.planning.refinement.faults.effect_bounds import EffectBounds, effect_bounds
 from hovi.scene.lagrangian import Lagrangian
 from hovi.scene.scene import Scene
 from hovi.scene.segmented_lagrangian import SegmentedLagrangian
@@ -29,13 +29,15 @@ CHANGE = 1.0
 """Largest change of the argument of a function in a part of time, as in exp(x) or sin(x)."""
 FIRST_PARTS = 4
 """Least number of parts of an interval."""
+PIECES = 4
+"""Pieces into which a part is split. Most of the time is spent per instruction, not per part."""
 INSTANTS = 2000
 """Least number of instants at which a Lagrangian without bounds is looked at."""
 MAX_PARTS = 20_000
 """Maximum number of parts of a motion."""
 LEAST_SHARE = 2.0**-34
 """Shortest part, relative to the duration."""
-_RULES = [np.polynomial.legendre.leggauss(points) for points in (6, 10)]
+_RULES = [np.polynomial.legendre.leggauss(points) for points in (4, 6)]
 _S = np.concatenate([(x + 1) / 2 for x, _ in _RULES])
 """The points of both rules in [0, 1]."""
 
@@ -61,10 +63,12 @@ class Parts:
         """Some of them."""
         return Parts(self.interval[which], self.begin[which], self.end[which])
 
-    def halves(self) -> Parts:
-        """Both halves of each, the left ones first."""
-        middle, k = 0.5 * (self.begin + self.end), np.tile(self.interval, 2)
-        return Parts(k, np.append(self.begin, middle), np.append(middle, self.end))
+    def split(self) -> Parts:
+        """PIECES equal pieces of each."""
+        s = np.arange(PIECES + 1) / PIECES
+        ends = self.begin[:, None] + (self.end - self.begin)[:, None] * s
+        k = np.repeat(self.interval, PIECES)
+        return Parts(k, ends[:, :-1].ravel(), ends[:, 1:].ravel())
 
     def joined(self, others: Parts) -> Parts:
         """These and others."""
@@ -144,46 +148,47 @@ class _Look:
     fault: str = ""
 
     def run(self) -> AlongMotion:
-        """Bisect, then integrate."""
+        """Split, then integrate."""
         N, sampled = self.motion.grid.intervals, tuple(x for s in self.seen for x in s.sampled)
-        least = -(-INSTANTS // (10 * N)) if sampled else 0
-        parts, unseen = self._bisected(Parts.of(N, max(FIRST_PARTS, least)), self._deviation)
-        parts, error = self._bisected(parts, self._rule_error)
-        values = self._integrals(parts)[1]
+        least = -(-INSTANTS // (len(_S) * N)) if sampled else 0
+        parts, unseen, _ = self._split(Parts.of(N, max(FIRST_PARTS, least)), self._deviation)
+        parts, error, values = self._split(parts, self._rule_error)
         by_interval = np.bincount(parts.interval, values, minlength=N).astype(np.float64)
         cost = float(by_interval.sum())
         return AlongMotion(cost, unseen + error, by_interval, parts, self.fault, sampled)
 
-    def _bisected(
-        self, parts: Parts, error_of: Callable[[Parts], tuple[Array, list[str]]]
-    ) -> tuple[Parts, float]:
-        """Parts that are bisected until the sum of their errors is within the budget, and it.
+    def _split(
+        self, parts: Parts, error_of: Callable[[Parts], tuple[Array, list[str], Array]]
+    ) -> tuple[Parts, float, Array]:
+        """Parts that are split until the sum of their errors is within the budget, and it.
 
-        error_of: errors, (P,), and names of what causes them.
+        error_of: errors, (P,), names of what causes them, and a number of each part, (P,),
+        which is returned, too.
         """
         grid, limit = self.motion.grid, LEAST_SHARE * self.motion.duration
-        errors, names = error_of(parts)
+        errors, names, values = error_of(parts)
         while errors.sum() > self.budget:
             cut = errors > self.budget / (2 * len(parts))
             steps = grid.steps[parts.interval] * (parts.end - parts.begin)
-            if steps[cut].min() < 2 * limit or len(parts) + np.count_nonzero(cut) > MAX_PARTS:
+            more_parts = (PIECES - 1) * np.count_nonzero(cut)
+            if steps[cut].min() < PIECES * limit or len(parts) + more_parts > MAX_PARTS:
                 i = int(np.argmax(errors))
                 t = grid.t[parts.interval[i]] + parts.begin[i] * grid.steps[parts.interval[i]]
                 self.fault = (
                     self.fault or f"{names[i]} changes within {steps[i]:.2g} s at {t:.6g} s"
                 )
                 break
-            halves = parts.chosen(cut).halves()
-            more, of = error_of(halves)
-            parts = parts.chosen(~cut).joined(halves)
-            errors = np.append(errors[~cut], more)
+            pieces = parts.chosen(cut).split()
+            more, of, others = error_of(pieces)
+            parts = parts.chosen(~cut).joined(pieces)
+            errors, values = np.append(errors[~cut], more), np.append(values[~cut], others)
             names = [x for x, gone in zip(names, cut, strict=True) if not gone] + of
-        return parts, float(errors.sum())
+        return parts, float(errors.sum()), values
 
-    def _rule_error(self, parts: Parts) -> tuple[Array, list[str]]:
-        """The differences of two Gauss rules in each part."""
+    def _rule_error(self, parts: Parts) -> tuple[Array, list[str], Array]:
+        """The differences of two Gauss rules in each part, and the integrals."""
         fewer, value = self._integrals(parts)
-        return np.abs(value - fewer), ["the cost"] * len(parts)
+        return np.abs(value - fewer), ["the cost"] * len(parts), value
 
     def _integrals(self, parts: Parts) -> Array:
         """The integral of L over each part by two rules, shape (2, P)."""
@@ -196,7 +201,7 @@ class _Look:
         pairs = zip(_RULES, (values[:, :fewer], values[:, fewer:]), strict=True)
         return np.stack([steps * (x @ rule[1]) / 2 for rule, x in pairs])
 
-    def _deviation(self, parts: Parts) -> tuple[Array, list[str]]:
+    def _deviation(self, parts: Parts) -> tuple[Array, list[str], Array]:
         """How much of the cost the effects may hide in each part, at most, and which of them."""
         errors, names = np.zeros(len(parts)), [""] * len(parts)
         for number, seen in enumerate(self.seen):
@@ -209,7 +214,7 @@ class _Look:
             errors[here] = total
             for place, which in zip(here, largest, strict=True):
                 names[place] = found[which][0]
-        return errors, names
+        return errors, names, errors
 
     @cached_property
     def _segments(self) -> Index:
@@ -223,9 +228,7 @@ class _Look:
         boxes, rates, tau = self._boxes(parts, steps)
         found = []
         for effect, peaks in zip(seen.bounded, seen.peaks, strict=False):
-            bounds = effect.value(boxes, CHANGE, peaks)
-            away = from_line(bounds, effect.rate([*boxes, *rates], CHANGE), steps[:, None])
-            away[bounds.calm] = 0.0
+            away = _deviations(effect, boxes, rates, steps, peaks)
             cost = self._cost_of_torque(tau, away) if effect.is_torque else away.sum(axis=1)
             found.append((effect.name, steps * cost))
         for part, peaks in zip(seen.base, seen.peaks[len(seen.bounded) :], strict=True):
@@ -255,6 +258,19 @@ class _Look:
         changes = [2.0 * np.diff(triples[i], axis=1) / steps[:, None, None] for i in (2, 3)]
         tau = np.abs(triples[3]).max(axis=1)
         return [_between(x) for x in triples], [_slopes(x) for x in changes], tau
+
+
+def _deviations(
+    effect: EffectBounds, boxes: list[Bound], rates: list[Bound], steps: Array, peaks: Array
+) -> Array:
+    """How far an effect may be from a line in each part, shape (P, m); 0 where it is calm."""
+    bounds = effect.value(boxes, CHANGE, peaks)
+    away, wild = np.zeros_like(bounds.lower), ~bounds.calm
+    if wild.any():
+        some = [(low[wild], high[wild]) for low, high in (*boxes, *rates)]
+        slopes = effect.rate(some, CHANGE)
+        away[wild] = from_line(bounds.chosen(wild), slopes, steps[wild][:, None])
+    return away
 
 
 def _inside(parts: Parts, s: Array) -> Array:

@@ -11,7 +11,12 @@ from hovi.discrete.curve_integral import integral_along
 from hovi.discrete.grid import Grid
 from hovi.planning.problem.tolerance import CURVE_TOLERANCE
 from hovi.planning.refinement.error_estimate import with_estimate
-from hovi.planning.refinement.faults.along_motion import AlongMotion, along_motion, may_be_narrow
+from hovi.planning.refinement.faults.along_motion import (
+    INSTANTS,
+    AlongMotion,
+    along_motion,
+    may_be_narrow,
+)
 from hovi.planning.refinement.faults.on_curve import (
     RESOLVED,
     costs_nothing,
@@ -37,7 +42,7 @@ class Features:
 
     along: its integral. by_interval: the cost at the points of each interval, (N,). size: absolute
     value of the cost, which errors are relative to. error: of the cost at the points, and what the
-    integral may miss. allowed: largest one of a success.
+    integral may miss. allowed: largest one of a success, with room for what that may miss.
     """
 
     along: AlongMotion
@@ -72,9 +77,9 @@ class Features:
         """What was looked at by samples alone, a sentence; "" if nothing."""
         if not self.along.sampled:
             return ""
+        names = " and ".join(self.along.sampled)
         return (
-            f"{' and '.join(self.along.sampled)} has no bounds between points: features that are "
-            f"narrower than {1 / 2000:.2g} of the motion may be missed."
+            f"Between {INSTANTS:,} instants {names} has no bounds: narrower features may be missed."
         )
 
 
@@ -94,7 +99,8 @@ def features_of(solution: Solution) -> Features | None:
     else:
         missed = abs(along.cost - integral_along(lagrangian, motion).value)
     error = (missed + along.error) / size
-    allowed = max(min(estimate, RESOLVED), RESOLVED if chosen is None else CURVE_TOLERANCE)
+    least = RESOLVED if chosen is None else CURVE_TOLERANCE
+    allowed = (1.0 + 2.0 * SHARE) * max(min(estimate, RESOLVED), least)
     return Features(along, values, size, float(np.nan_to_num(error, nan=np.inf)), allowed)
 
 
