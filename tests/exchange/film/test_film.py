@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -66,6 +68,26 @@ def test_a_gif_shows_the_replay_page_without_its_controls(
     assert changed(found[2], found[-1]) > 0.002
     dark = found[0][:, SIZE[0] * 2 // 3 :, :].max(axis=2) < 60  # the page's panel is dark
     assert dark.mean() < 0.05
+
+
+@pytest.mark.parametrize("page", [pytest.param(True, marks=with_browser), False])
+def test_a_film_has_the_cautions_of_its_motion_at_the_top(
+    motion: Trajectory, tmp_path: Path, page: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A line of text there, and nothing else that a motion without cautions does not have."""
+    if not page:
+        monkeypatch.setattr(headless_browser, "NAMES", ())
+    said = [["coarse", "The grid is coarse, and the curve costs more than its points."]]
+    cautious = dataclasses.replace(motion, metadata={**motion.metadata, "cautions": said})
+    films = []
+    for k, each in enumerate((motion, cautious)):
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", HoviWarning)
+            each.to_gif(tmp_path / f"{k}.gif", 2.0)
+        films.append(pictures_of(tmp_path / f"{k}.gif")[0][0])
+    top = 40
+    assert changed(films[0][:top], films[1][:top]) > 0.01
+    assert changed(films[0][top:], films[1][top:]) < 0.002
 
 
 def test_without_a_browser_the_robot_is_drawn_by_bars(
