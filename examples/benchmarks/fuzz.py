@@ -39,6 +39,7 @@ KINDS = {
     "compiled": ("hard.compiled_calls", 14_000),
     "api": ("hard.api_calls", 14_000),
     "mesh": ("hard.mutated_mesh", 3_000),
+    "surface": ("hard.mutated_surface", 10_000),
 }
 HANG, STARTUP = 10.0, 120.0  # [s]
 FAULTS = (Verdict.CRASH, Verdict.HANG, Verdict.SILENT, Verdict.UNCLEAR)

@@ -21,6 +21,7 @@ from hard import (
     mutated_scene,
     mutated_segments,
     mutated_study,
+    mutated_surface,
     mutated_urdf,
 )
 from hard.verdict import Verdict
@@ -31,6 +32,7 @@ MUTATED = (
     mutated_motion,
     mutated_segments,
     mutated_mesh,
+    mutated_surface,
     mutated_obstacles,
     mutated_study,
     mutated_command,

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import os
 import xml.etree.ElementTree as ElementTree
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -17,14 +18,10 @@ import pinocchio as pin
 
 from hovi.errors import ModelError
 from hovi.robot.example_robots import example_robot
+from hovi.robot.meshes.mesh_shape import MeshShape, mesh_shape
 from hovi.robot.model import build_full_model, couplings_in, locked_and_coupled
 from hovi.robot.source import RobotSource, holds_all_files
 from hovi.robot.urdf.check import checked_urdf
-from hovi.robot.urdf.mesh_contents import (
-    one_line,
-    remove_unusable_shapes,
-    without_unreadable_meshes,
-)
 from hovi.robot.urdf.mesh_files import check_mesh, is_inside
 from hovi.robot.urdf.normalize import make_plain
 from hovi.system.dataclass import dataclass
@@ -32,6 +29,10 @@ from hovi.system.files import reason
 
 MAX_ALL_MESHES = 256_000_000
 """Largest sum of the bytes of all meshes, each counted as often as it is used."""
+
+
+Meshes = dict[tuple[str, int], MeshShape]
+"""The meshes of a URDF by the name of their link and their number among its shapes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,27 +47,22 @@ def load_shapes(source: RobotSource, kind: str) -> Shapes:
     """The "visual" or "collision" geometry of a source, with its joints locked and coupled."""
     if source.urdf is None:
         return Shapes(None, f"robot {source.reference!r} was given without {kind} geometry.")
-    text, problems = _with_found_meshes(source, kind)
+    text, meshes, problems = _without_meshes(source, kind)
     geometry_type = pin.GeometryType.VISUAL if kind == "visual" else pin.GeometryType.COLLISION
     model = build_full_model(source)
     try:
         geometry = pin.buildGeomFromUrdfString(model, text, geometry_type)
-    except (ValueError, RuntimeError):
-        text, more = without_unreadable_meshes(text, kind)
-        problems += more
-        try:
-            geometry = pin.buildGeomFromUrdfString(model, text, geometry_type)
-        except (ValueError, RuntimeError) as error:
-            reason = one_line(error)
-            return Shapes(None, f"{kind} shapes of {source.reference!r} cannot be read: {reason}.")
-    problems += remove_unusable_shapes(geometry, model)
+    except (ValueError, RuntimeError) as error:
+        reason = " ".join(str(error).split())
+        return Shapes(None, f"{kind} shapes of {source.reference!r} cannot be read: {reason}.")
+    _put_in(meshes, geometry, model)
     _, (geometry,) = locked_and_coupled(model, [geometry], source.held, couplings_in(source))
     problem = _sentence(source, kind, problems)
     return Shapes(geometry if geometry.ngeoms or not problems else None, problem)
 
 
-def find_mesh(filename: str, source: RobotSource, drawn: bool = False) -> Path:
-    """The file of a mesh.
+def find_mesh(filename: str, source: RobotSource, drawn: bool = False) -> tuple[Path, bytes]:
+    """The file of a mesh, and its content.
 
     drawn: whether its textures are needed, too.
     Raises ModelError if it does not exist, cannot be used, or if it or a file that it names is
@@ -86,8 +82,7 @@ def find_mesh(filename: str, source: RobotSource, drawn: bool = False) -> Path:
                     "inside their package; to allow another folder, name it in package_dirs."
                 )
             if path.is_file():
-                check_mesh(path, root, drawn)
-                return path
+                return path, check_mesh(path, root, drawn)
     except (OSError, RuntimeError, ValueError) as error:  # too long, a loop of links, a NUL
         why = reason(error) if isinstance(error, OSError) else "no file can have that path"
         raise ModelError(f"mesh {_short(filename)} cannot be looked for: {why}.") from error
@@ -142,20 +137,43 @@ def _package_dirs(source: RobotSource) -> list[Path]:
     return folders
 
 
-def _with_found_meshes(source: RobotSource, kind: str) -> tuple[str, list[str]]:
-    """The URDF with absolute mesh paths, without shapes whose mesh is unusable; and the reasons."""
+def _without_meshes(source: RobotSource, kind: str) -> tuple[str, Meshes, list[str]]:
+    """The URDF with a box in place of every mesh, the meshes, and why other shapes are left out."""
     robot = checked_urdf(source.urdf or "", source.reference)
     _drop_textures(robot)
-    problems, room = [], MAX_ALL_MESHES
+    problems, meshes, room = list[str](), Meshes(), MAX_ALL_MESHES
     for link in robot.iterfind("link"):
+        name, kept = link.get("name", ""), 0
         for shape in link.findall(kind):
-            problem, size = _find_meshes(shape, source, kind == "visual", room)
-            room -= size
-            if problem:
-                problems.append(f"link {link.get('name')!r}: {problem}")
+            try:
+                if (mesh := shape.find("geometry/mesh")) is not None:
+                    meshes[name, kept] = _read(mesh, source, kind == "visual", room)
+                    room -= meshes[name, kept].size
+            except ModelError as error:
+                problems.append(f"link {name!r}: {error}")
                 link.remove(shape)
+            else:
+                kept += 1
+    _replace_meshes(robot)
     make_plain(robot)
-    return ElementTree.tostring(robot, encoding="unicode"), problems
+    return ElementTree.tostring(robot, encoding="unicode"), meshes, problems
+
+
+def _replace_meshes(robot: ElementTree.Element) -> None:
+    for geometry in robot.iter("geometry"):
+        for mesh in geometry.findall("mesh"):
+            geometry.remove(mesh)
+            ElementTree.SubElement(geometry, "box", size="1 1 1")
+
+
+def _put_in(meshes: Meshes, geometry: pin.GeometryModel, model: pin.Model) -> None:
+    """Replace the boxes that stand for meshes. Shapes are numbered within their link."""
+    counts = Counter[str]()
+    for item in geometry.geometryObjects:
+        link = str(model.frames[item.parentFrame].name)
+        if (mesh := meshes.get((link, counts[link]))) is not None:
+            item.geometry, item.meshPath, item.meshScale = mesh.shape, mesh.path, mesh.scale
+        counts[link] += 1
 
 
 def _drop_textures(robot: ElementTree.Element) -> None:
@@ -168,25 +186,14 @@ def _drop_textures(robot: ElementTree.Element) -> None:
             robot.remove(material)
 
 
-def _find_meshes(
-    shape: ElementTree.Element, source: RobotSource, drawn: bool, room: int
-) -> tuple[str, int]:
-    """Replace the names of meshes by absolute paths; what is wrong, or "", and their bytes.
-
-    room: the largest number of bytes.
-    """
-    size = 0
-    for mesh in shape.iter("mesh"):
-        try:
-            path = find_mesh(mesh.get("filename", ""), source, drawn)
-        except ModelError as error:
-            return str(error), 0
-        size += path.stat().st_size
-        mesh.set("filename", f"file://{path}")
-        if size > room:
-            largest = f"{MAX_ALL_MESHES / 1e6:.0f} MB"
-            return f"mesh {path.name!r} makes the meshes of all shapes exceed {largest}.", 0
-    return "", size
+def _read(mesh: ElementTree.Element, source: RobotSource, drawn: bool, room: int) -> MeshShape:
+    """The shape of a <mesh>. room: the largest number of bytes. Raises ModelError."""
+    path, content = find_mesh(mesh.get("filename", ""), source, drawn)
+    if len(content) > room:
+        largest = f"{MAX_ALL_MESHES / 1e6:.0f} MB"
+        raise ModelError(f"mesh {path.name!r} makes the meshes of all shapes exceed {largest}.")
+    scale = [float(word) for word in mesh.get("scale", "1 1 1").split()]
+    return mesh_shape(path, content, scale)
 
 
 def _sentence(source: RobotSource, kind: str, problems: list[str]) -> str:

@@ -63,8 +63,8 @@ def test_a_hull_is_nowhere_farther_than_the_triangles(u_shape: Path) -> None:
     equal = 0
     for x in outside(PLACED):
         d, bound = least(obstacle, x), shape_distance(ball(0.01, x), (triangles, PLACED))
-        assert d <= bound + 1e-9
-        equal += abs(d - bound) < 1e-9
+        assert d <= bound + 1e-8  # Coal's own reader rounds to single precision
+        equal += abs(d - bound) < 1e-8
     assert equal > 50
     in_gap = PLACED.act(np.array([0.3, 0.35, 0.1]))
     assert least(obstacle, in_gap) < 0.0
@@ -187,7 +187,7 @@ def test_a_recorded_mesh_needs_no_file(u_shape: Path) -> None:
     [
         (lambda folder: hovi.Mesh(folder / "none.stl"), "there is no mesh '.*none.stl'"),
         (lambda folder: hovi.Mesh(folder / "flat.stl"), "'flat.stl' has no convex hull"),
-        (lambda folder: hovi.Mesh(folder / "text.stl"), "mesh 'text.stl' cannot be read"),
+        (lambda folder: hovi.Mesh(folder / "text.stl"), "mesh 'text.stl' is no STL: line 2"),
         (lambda folder: hovi.Mesh(folder / "mesh.blend"), "'mesh.blend' is not of a type"),
         (lambda folder: hovi.Mesh("a\0b.stl"), "no file can have that path|there is no mesh"),
         (lambda folder: hovi.Mesh(folder / "flat.stl", scale=0.0), "`scale` of a mesh must be po"),

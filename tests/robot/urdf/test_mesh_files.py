@@ -111,7 +111,7 @@ def test_the_library_that_is_opened_in_place_of_a_missing_one_is_checked(package
     assert_left_out(package, "rod.obj", "lies outside")
 
 
-def test_the_kernel_reports_a_texture_and_a_library_that_are_opened(package: Path) -> None:
+def test_the_kernel_reports_a_texture_that_is_opened_and_no_library(package: Path) -> None:
     (package / "meshes").mkdir()
     (package / "meshes" / "rod.dae").write_text(textured("../textures/wood.png"))
     (package / "textures" / "wood.mtl").write_text("newmtl a\n")
@@ -121,7 +121,7 @@ def test_the_kernel_reports_a_texture_and_a_library_that_are_opened(package: Pat
         with opened_files(package / "textures") as opened:
             page_of(load_robot(mesh_arm(package, mesh)))
         seen.append(opened)
-    assert seen == [{"wood.png"}, {"wood.mtl"}]
+    assert seen == [{"wood.png"}, set()]
 
 
 def page_of(robot: Robot) -> str:

@@ -6,12 +6,11 @@ import hashlib
 from functools import lru_cache
 from pathlib import Path
 
-import coal
 import numpy as np
 import numpy.typing as npt
 
 from hovi.errors import InputError, ModelError
-from hovi.robot.urdf.mesh_contents import MAX_COORDINATE, one_line
+from hovi.robot.meshes.reading import triangles_in
 from hovi.robot.urdf.mesh_files import check_mesh
 from hovi.system.dataclass import dataclass
 from hovi.system.files import reason
@@ -53,35 +52,24 @@ def read_mesh(path: str) -> TriangleMesh:
     try:
         if not file.is_file():
             raise InputError(f"there is no mesh {str(file)!r}.")
-        check_mesh(file, file.parent, drawn=False)
-        digest = hashlib.sha256(file.read_bytes()).hexdigest()
+        return _loaded(file, check_mesh(file, file.parent, drawn=False))
     except ModelError as error:
         raise InputError(str(error)) from None
     except (OSError, ValueError) as error:
         why = reason(error) if isinstance(error, OSError) else "no file can have that path"
         raise InputError(f"mesh {_short(path)!r} cannot be read: {why}.") from None
-    return _loaded(file, digest)
 
 
 @lru_cache(maxsize=64)
-def _loaded(file: Path, digest: str) -> TriangleMesh:
-    """digest: of the file, so that one that has changed is read again."""
-    try:
-        mesh = coal.MeshLoader().load(str(file), np.ones(3))
-    except (ValueError, RuntimeError) as error:
-        raise InputError(f"mesh {file.name!r} cannot be read: {one_line(error)}.") from None
-    vertices = np.array(mesh.vertices(), dtype=np.float64).reshape(-1, 3)
-    if not (np.abs(vertices) <= MAX_COORDINATE).all():
-        raise InputError(
-            f"mesh {file.name!r} has coordinates that are not finite, or larger than "
-            f"{MAX_COORDINATE:g} m: repair it."
-        )
-    found = (mesh.tri_indices(k) for k in range(mesh.num_tris))
-    rows = [[each[0], each[1], each[2]] for each in found]
-    corners, which = np.unique(vertices, axis=0, return_inverse=True)
-    triangles = which.reshape(-1)[np.array(rows, dtype=np.int64).reshape(-1, 3)]
-    content = hashlib.sha256(corners.tobytes() + triangles.astype("<i8").tobytes())
-    return TriangleMesh(file.name, corners, triangles, content.hexdigest())
+def _loaded(file: Path, content: bytes) -> TriangleMesh:
+    """content: of the file, so that one that has changed is read again."""
+    mesh = triangles_in(file, content)
+    corners, which = np.unique(mesh.vertices, axis=0, return_inverse=True)
+    triangles = which.reshape(-1)[mesh.triangles]
+    distinct = (triangles != np.roll(triangles, 1, axis=1)).all(axis=1)
+    triangles = triangles[distinct]
+    digest = hashlib.sha256(corners.tobytes() + triangles.astype("<i8").tobytes())
+    return TriangleMesh(file.name, corners, triangles, digest.hexdigest())
 
 
 def _sorted_rows(rows: Index) -> Index:

@@ -1,8 +1,7 @@
 """Checks the files that a mesh names: textures of Collada, material libraries of OBJ.
 
-Coal opens a library when it reads the mesh, and a replay page embeds the textures, so both must lie
-where the mesh itself must lie. Formats other than MESH_TYPES are refused: Coal would read them, and
-some of them open further files by rules of their own.
+A replay page embeds the textures and shows the mesh with its library, so both must lie where the
+mesh itself must lie.
 """
 
 from __future__ import annotations
@@ -14,9 +13,9 @@ from pathlib import Path
 from xml.parsers import expat
 
 from hovi.errors import ModelError
+from hovi.robot.meshes.reading import MESH_TYPES
 from hovi.system.files import reason, require_file
 
-MESH_TYPES = (".dae", ".obj", ".off", ".ply", ".stl")
 MAX_MESH_BYTES = 256_000_000
 MAX_NAMED_BYTES = 64_000_000
 """Largest mesh, and largest texture or material library, in bytes."""
@@ -26,8 +25,8 @@ _CONTINUED = re.compile(rb"\\(?:\n|[\r\0\f][^\n]*\n)")
 _LIBRARY = re.compile(rb"mtllib[ \t\v]*([^\r\n\0\f]*)")
 
 
-def check_mesh(path: Path, root: Path, drawn: bool) -> None:
-    """Check a mesh and the names of files in it.
+def check_mesh(path: Path, root: Path, drawn: bool) -> bytes:
+    """The content of a mesh, after a check of the names of files in it.
 
     path: of the mesh, an existing file.
     root: the folder that must contain everything that the mesh names.
@@ -43,13 +42,15 @@ def check_mesh(path: Path, root: Path, drawn: bool) -> None:
         )
     try:
         require_file(path, MAX_MESH_BYTES)
-        content = path.read_bytes() if kind in _FILES_IN else b""
+        content = path.read_bytes()
     except OSError as error:
         raise ModelError(f"mesh {path.name!r} cannot be read: {reason(error)}.") from error
-    for name, is_shown in _FILES_IN[kind](path.name, content) if content else ():
-        _check_named(path, name, root, must_exist=drawn and is_shown)
-    if drawn:
-        _check_text(path.name, content)
+    if kind in _FILES_IN:
+        for name, is_shown in _FILES_IN[kind](path.name, content):
+            _check_named(path, name, root, must_exist=drawn and is_shown)
+        if drawn:
+            _check_text(path.name, content)
+    return content
 
 
 def is_inside(path: Path, folder: Path) -> bool:

@@ -1,0 +1,1 @@
+"""Triangles of mesh files, read without any foreign library."""
