@@ -255,14 +255,17 @@ def test_features_of_time_are_found_and_paid_for(
     assert_honest(case, found)
 
 
-@pytest.mark.parametrize("make", [pulse, jolt])
-def test_a_tolerance_of_one_millionth_holds_along_the_curve(
-    make: Callable[[float, float], Case],
+@pytest.mark.parametrize(
+    ("make", "width", "tolerance"), [(pulse, 2e-4, 1e-6), (jolt, 2e-4, 1e-6), (friction, 0.3, 1e-5)]
+)
+def test_a_smaller_tolerance_holds_along_the_curve(
+    make: Callable[[float, float], Case], width: float, tolerance: float
 ) -> None:
-    case = make(0.7123, 2e-4)
-    found = planned(case, tolerance=1e-6)
+    case = make(0.7123, width)
+    found = planned(case, tolerance=tolerance)
     assert found.success, found.message
-    assert abs(along(case, found.trajectory) / found.cost - 1) <= ORACLE
+    assert found.accuracy.reached
+    assert abs(along(case, found.trajectory) / found.cost - 1) <= tolerance + ORACLE
 
 
 @pytest.mark.parametrize("make", OF_TIME + OF_STATE)
@@ -294,6 +297,11 @@ def test_what_no_grid_resolves_is_said_at_once() -> None:
         assert not found.success
         assert found.status == "unresolved"
         assert "'wrench' changes within less than" in found.message
+    segments = [hovi.Segment([0.2, 0.5], 0.8), hovi.Segment(GOAL, 0.7, effects=[fast])]
+    scene = hovi.Scene(ROBOT, [E.Gravity(GRAVITY)])
+    found = hovi.plan_sequence(scene, START, segments, limits="none", self_collision=False)
+    assert found.status == "unresolved"
+    assert "'wrench' changes within less than" in found.message
 
 
 def test_replanned_motions_are_looked_at_again() -> None:
@@ -304,6 +312,15 @@ def test_replanned_motions_are_looked_at_again() -> None:
     again = found.replan(goal=[1.4, 0.8])
     assert_honest(case, again)
     assert not again.success
+
+
+def test_motions_near_one_that_was_resolved_are_looked_at_again() -> None:
+    case = cost("cost in q", shoulder, "q['shoulder']", 0.91, 1e-3, 6e4)
+    found = planned(case)
+    assert found.success
+    near = found.replan(goal=[0.93, 0.8])
+    assert_honest(case, near)
+    assert not near.success
 
 
 def test_a_pulse_in_a_segment_of_a_sequence_is_paid_for() -> None:
@@ -344,3 +361,9 @@ def test_an_expression_without_bounds_is_said_to_be_sampled() -> None:
 def test_no_success_of_the_family_is_off_by_more_than_its_estimate(number: int) -> None:
     case, options = list(family(40, 40))[number]
     assert_honest(case, planned(case, **options))
+
+
+@pytest.mark.parametrize("seconds", [0.3, 0.6, 1.0, 1.5])
+def test_a_time_limit_during_another_look_is_no_error(seconds: float) -> None:
+    case = cost("cost in v", speed, "v['shoulder']", 0.6, 1e-3, 6e4)
+    assert_honest(case, planned(case, limits="urdf", time_limit=seconds))

@@ -176,7 +176,10 @@ class Search:
         if tolerance is None or self.free is not None or NARROW not in refused.message:
             return refused
         stages = FinalStages(self.fine, self.deadline, self.progress)
-        seen = stages.seeing_features(tolerance, solution)
+        try:
+            seen = stages.seeing_features(tolerance, solution)
+        except OutOfTimeError:
+            return refused
         return refused if seen is solution else resolved(seen)
 
     def _with_duration(self, refused: Solution) -> Solution:
