@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from hard import (
     api_calls,
     compiled_calls,
+    grammar_scenes,
     mutated_command,
     mutated_mesh,
     mutated_motion,
@@ -29,6 +30,7 @@ from hard.verdict import Verdict
 MUTATED = (
     mutated_urdf,
     mutated_scene,
+    grammar_scenes,
     mutated_motion,
     mutated_segments,
     mutated_mesh,

@@ -48,6 +48,7 @@ def judge(
     """
     try:
         with warnings.catch_warnings():
+            warnings.simplefilter("error")  # of Python or NumPy: a value that was not checked
             warnings.simplefilter("ignore", HoviWarning)  # a word, and no failure
             problem = error_in(load()) or reason
     except HoviError as error:

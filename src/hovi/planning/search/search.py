@@ -79,10 +79,11 @@ class Search:
         """A solution without self-collision as one with; None if links come too near in it."""
         clearance, problem = self.fine.options.clearance, free.problem or self.fine.problem()
         problem = with_clearance(on_grid_of(problem, free), clearance)
-        assert problem.distances is not None
-        kept = dataclasses.replace(free, problem=problem)
+        kept, near = dataclasses.replace(free, problem=problem), 0
         ended = free.status in (*STOPPED, Status.INFEASIBLE) or interrupted()
-        if not ended and len(near_pairs(free.trajectory, problem.distances, clearance.margin)) > 0:
+        if not ended and problem.distances is not None:  # there are pairs, within reach
+            near = len(near_pairs(free.trajectory, problem.distances, clearance.margin))
+        if near:
             return None
         motion = with_metadata(free.trajectory, clearance=clearance.to_dict())
         kept = dataclasses.replace(kept, trajectory=motion)
