@@ -103,7 +103,7 @@ MISTAKES: dict[str, tuple[dict[str, Any], str]] = {
 def task(changes: dict[str, Any]) -> dict[str, Any]:
     """A task of a UR5 with a mistake."""
     whole = {
-        **{"robot": "ur5", "duration": 1.5, "start": {"q": Q0}, "goal": {"q": Q1}},
+        **{"format": 2, "robot": "ur5", "duration": 1.5, "start": {"q": Q0}, "goal": {"q": Q1}},
         **{"effects": {"gravity": {}}, **changes},
     }
     if "segments" in whole:

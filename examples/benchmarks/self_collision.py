@@ -26,6 +26,7 @@ from random_arms import Reach, middle_and_most, random_reaches, timed
 
 import hovi
 from hovi.planning.clearance.clearance import DEFAULT_MARGIN
+from hovi.planning.clearance.distances import distances_between
 from hovi.planning.clearance.self_collisions import self_collision_pairs
 
 Array = npt.NDArray[np.float64]
@@ -77,21 +78,27 @@ class Meshes:
         centers = [at.act(np.array(shape.aabb_center)) for shape, at in ends]
         far = float(np.linalg.norm(centers[1] - centers[0]))
         far -= sum(float(shape.aabb_radius) for shape, _ in ends)
-        if far > 2 * NEAR:
+        if far > NEAR:
             return far
+        overlap = coal.CollisionResult()
+        if coal.collide(*placed[0], *placed[1], coal.CollisionRequest(), overlap):
+            return 0.0
         result = coal.DistanceResult()
         coal.distance(*placed[0], *placed[1], coal.DistanceRequest(), result)
         return float(max(result.min_distance, 0.0))
 
+    def at(self, motion: hovi.Trajectory, t: Array) -> Array:
+        """The least distance at some times of a motion, (M,), in [m]."""
+        return self.distances(motion.sample(t).q).min(axis=1)
+
     def least_along(self, motion: hovi.Trajectory) -> float:
-        """The least distance along a motion, in [m]."""
-        T = motion.duration
-        t = np.linspace(0.0, T, INSTANTS)
-        d = self.distances(motion.sample(t).q).min(axis=1)
+        """The least distance along a motion, in [m], which is looked at around the least ones."""
+        t = np.linspace(0.0, motion.duration, INSTANTS)
+        d = self.at(motion, t)
+        inner = np.flatnonzero((d[1:-1] <= d[:-2]) & (d[1:-1] <= d[2:])) + 1
         least = [d.min()]
-        for k in np.argsort(d)[:LEAST]:
-            near = np.linspace(t[max(k - 1, 0)], t[min(k + 1, INSTANTS - 1)], AROUND)
-            least.append(self.distances(motion.sample(near).q).min())
+        for k in inner[np.argsort(d[inner])][:LEAST]:
+            least.append(self.at(motion, np.linspace(t[k - 1], t[k + 1], AROUND)).min())
         return float(min(least))
 
 
@@ -136,8 +143,6 @@ def apart(scene: hovi.Scene, count: int, seed: int) -> Iterator[Reach]:
 
 def hovi_distances(robot: hovi.Robot, q: Array) -> Array:
     """Distances of hovi's hulls, (M, K)."""
-    from hovi.planning.clearance.distances import distances_between
-
     return distances_between(robot, hovi.Clearance(self_collision=True)).values(q)
 
 
@@ -151,11 +156,12 @@ def measure(arm: str, count: int, seed: int) -> list[Run]:
         if number == 0:
             hovi.plan(*ends, **common)
         without, free = timed(lambda e=ends: hovi.plan(*e, self_collision=False, **common))
-        seconds, plan = timed(lambda e=ends: hovi.plan(*e, self_collision=True, **common))
-        nearest = meshes.least_along(free.trajectory), meshes.least_along(plan.trajectory)
+        seconds, plan = timed(lambda e=ends: hovi.plan(*e, **common))
+        T = np.linspace(0.0, reach.duration, INSTANTS // 10)
+        nearest = meshes.at(free.trajectory, T).min(), meshes.least_along(plan.trajectory)
         changed = plan.cost / free.cost - 1.0
         given = str(plan.status), plan.message, seconds, seconds / without
-        run = Run(arm, number, *given, *nearest, changed)
+        run = Run(arm, number, *given, float(nearest[0]), nearest[1], changed)
         print(
             f"{arm} {number}: {run.status}, {seconds:.2f} s, ratio {run.ratio:.2f}, least distance "
             f"{nearest[0]:.4f} without, {nearest[1]:.6f} with; cost {100 * changed:+.2g} %",

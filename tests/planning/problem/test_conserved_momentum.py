@@ -80,7 +80,9 @@ def test_the_mechanical_momentum_drifts_by_the_order_of_the_scheme() -> None:
 
 def test_the_center_of_mass_of_a_falling_quadruped_moves_on_a_parabola() -> None:
     task = hovi.load_task(hovi.example("solo_in_flight"))
-    solution = hovi.plan(task.scene, task.start, task.goal, task.duration, limits="none")
+    solution = hovi.plan(
+        task.scene, task.start, task.goal, task.duration, limits="none", self_collision=False
+    )
     assert solution.success, solution.message
     t = np.linspace(0, task.duration, 21)
     sample, data = solution.trajectory.sample(t), task.scene.model.createData()
@@ -94,7 +96,9 @@ def contradiction(**changes: object) -> str:
     """The message for the reorientation with another goal."""
     task = spacecraft()
     goal = dataclasses.replace(task.goal, **changes)
-    solution = hovi.plan(task.scene, task.start, goal, task.duration, limits="none")
+    solution = hovi.plan(
+        task.scene, task.start, goal, task.duration, limits="none", self_collision=False
+    )
     assert solution.status is hovi.Status.INFEASIBLE
     assert not solution.success
     return solution.message
@@ -123,7 +127,7 @@ def test_a_goal_that_needs_another_momentum_is_infeasible() -> None:
     turned = free.copy()
     turned[1, 0, 3:6] = True  # then the momentum of the goal is unknown
     assert free_fall_contradiction(task.scene, (q, np.zeros(9), q, v), turned, 8.0) == ""
-    moving = hovi.plan(task.scene, state, task.start, 8.0, limits="none")
+    moving = hovi.plan(task.scene, state, task.start, 8.0, limits="none", self_collision=False)
     assert moving.status is hovi.Status.INFEASIBLE
 
 
@@ -159,14 +163,16 @@ def test_parts_of_an_orientation_cannot_be_free_alone() -> None:
     task = spacecraft()
     goal = dataclasses.replace(task.goal, free=("root_joint[3]", "root_joint[4]"))
     with pytest.raises(InputError, match="the position, one rotation, all rotations or everything"):
-        hovi.plan(task.scene, task.start, goal, 1.0)
+        hovi.plan(task.scene, task.start, goal, 1.0, self_collision=False)
 
 
 def test_a_base_with_thrusters_may_go_anywhere() -> None:
     task = spacecraft()
     scene = hovi.Scene(task.scene.robot)
     goal = dataclasses.replace(task.goal, free=(), free_velocity=())
-    solution = hovi.plan(scene, task.start, goal, task.duration, limits="none")
+    solution = hovi.plan(
+        scene, task.start, goal, task.duration, limits="none", self_collision=False
+    )
     assert solution.success, solution.message
     J = momentum_map(solution)
     assert np.max(np.ptp(J, axis=0)) < 1e-10 * np.max(np.abs(J))

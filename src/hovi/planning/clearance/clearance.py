@@ -20,11 +20,13 @@ MAX_MARGIN = 1e9
 """Largest margin, in [m]."""
 MAX_OBSTACLES = 1_000
 """Maximum number of obstacles."""
+MOST_GAP = 1e-5
+"""Most by which a pair that is nearer than the margin at an end may be nearer, in [m]."""
 TOUCH_DEPTH = 1e-3
 """Depth by which shapes that may touch may overlap, in [m]."""
 
 
-@check_arguments_except("obstacles", "margin", "may_touch", "left_out")
+@check_arguments_except("obstacles", "margin", "may_touch", "left_out", "gaps")
 @dataclass(frozen=True, eq=False)
 class Clearance:
     """distance >= margin between the robot's collision shapes and obstacles, all along a motion.
@@ -38,6 +40,8 @@ class Clearance:
     may_touch: pairs of names, of a link and of an obstacle or another link, that need not keep the
         margin and may overlap by TOUCH_DEPTH, such as what is grasped and what it stands on.
     left_out: pairs of names of links that are not kept apart.
+    gaps: pairs of names, with by how much less than the margin they may be apart, up to MOST_GAP:
+        a problem sets those of pairs that are hardly nearer than it at an end.
     Raises InputError for other objects, equal names or a margin that is no length.
     """
 
@@ -46,6 +50,7 @@ class Clearance:
     self_collision: bool = False
     may_touch: Sequence[tuple[str, str]] = ()
     left_out: Sequence[tuple[str, str]] = ()
+    gaps: Sequence[tuple[str, str, float]] = ()
 
     def __post_init__(self) -> None:
         if isinstance(self.obstacles, Obstacle | Mapping):
@@ -73,6 +78,10 @@ class Clearance:
         object.__setattr__(self, "obstacles", named)
         for name in ("may_touch", "left_out"):
             object.__setattr__(self, name, _pairs_of_names(getattr(self, name), name))
+        if not all(0.0 <= gap <= MOST_GAP + 1e-6 for *_, gap in self.gaps):
+            raise InputError(
+                f"gaps must be lengths from 0 to {MOST_GAP:g} m, got {self.gaps!r:.200}."
+            )
         number = isinstance(self.margin, float | int) and not isinstance(self.margin, bool)
         if not (number and 0 <= self.margin <= MAX_MARGIN):
             raise InputError(
@@ -107,6 +116,7 @@ class Clearance:
                 for name, pairs in (("may_touch", self.may_touch), ("left_out", self.left_out))
                 if pairs
             },
+            **({"gaps": [list(each) for each in self.gaps]} if self.gaps else {}),
         }
 
     @classmethod
@@ -122,7 +132,8 @@ class Clearance:
                 [tuple(pair) for pair in data.get(name, ())] for name in ("may_touch", "left_out")
             )
             margin, both = float(data["margin"]), bool(data["self_collision"])
-            return cls(obstacles, margin, both, touching, left_out)
+            gaps = [(str(a), str(b), float(gap)) for a, b, gap in data.get("gaps", ())]
+            return cls(obstacles, margin, both, touching, left_out, gaps)
         except (KeyError, TypeError, ValueError, OverflowError, AttributeError) as error:
             raise InputError(
                 f"expected the clearance that `to_dict` returns, got data with {error!r}."
@@ -166,7 +177,7 @@ class PartOfClearance(Clearance):
     def of(cls, whole: Clearance, numbers: Sequence[int]) -> PartOfClearance:
         """Of pairs by their numbers."""
         fields = whole.obstacles, whole.margin, whole.self_collision, whole.may_touch
-        return cls(*fields, whole.left_out, whole, tuple(int(k) for k in numbers))
+        return cls(*fields, whole.left_out, whole.gaps, whole, tuple(int(k) for k in numbers))
 
     @property
     def wanted(self) -> bool:

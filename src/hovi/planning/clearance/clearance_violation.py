@@ -174,16 +174,30 @@ def approach_sentence(
     k, pair = approach.worst()
     t = trajectory.t[k] + approach.at[k, pair] * trajectory.grid.steps[k]
     distance = float(approach.distance[k, pair] - distances.allowance[pair])
+    digits = digits_between(distance, margin)
     return (
-        f"{distances.pairs[pair]} {distance_in_words(distance)} at "
-        f"t = {t:.3g} s, the margin is {margin:g} m"
+        f"{distances.pairs[pair]} {distance_in_words(distance, digits)} at "
+        f"t = {t:.3g} s, the margin is {margin:.{max(digits, 6)}g} m"
     )
 
 
-def distance_in_words(distance: float) -> str:
-    """A signed distance as the predicate of a sentence about a pair."""
+def distance_in_words(distance: float, digits: int = 3) -> str:
+    """A signed distance as the predicate of a sentence about a pair. digits: of it."""
     if abs(distance) < TOUCHING:
         return "touch"
     if distance < 0:
         return f"overlap by {-distance:.3g} m"
-    return f"are {distance:.3g} m apart"
+    return f"are {distance:.{digits}g} m apart"
+
+
+def digits_between(distance: float, margin: float) -> int:
+    """The number of digits, 3 or more, with which a distance and a margin look different."""
+    unlike = (n for n in range(3, 17) if f"{distance:.{n}g}" != f"{margin:.{n}g}")
+    return next(unlike, 17)
+
+
+def less_than_margin(distance: float, margin: float) -> str:
+    """A distance below the margin as the predicate of a sentence about a pair, and the margin."""
+    digits = digits_between(distance, margin)
+    needed = f", less than the margin of {margin:.{max(digits, 6)}g} m"
+    return distance_in_words(distance, digits) + ("" if distance < TOUCHING else needed)

@@ -100,7 +100,13 @@ class Distances:
         self.pairs = tuple(marked_as_touching(pairs, clearance.may_touch, names))
         self.ends = tuple(ends)
         allowed = float(clearance.margin) + TOUCH_DEPTH
-        self.allowance = np.array([allowed if pair.touching else 0.0 for pair in self.pairs])
+        gaps = {(link, other): gap for link, other, gap in clearance.gaps}
+        self.allowance = np.array(
+            [
+                allowed if pair.touching else gaps.get((pair.link, pair.other), 0.0)
+                for pair in self.pairs
+            ]
+        )
         self.moving: Mapping[int, int] = moving
         self._measured = PairDistances(robot, geometry, moving)
         self._chosen = np.arange(len(pairs))

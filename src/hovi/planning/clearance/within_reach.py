@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import dataclasses
 from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
 
-from hovi.planning.clearance.clearance import Clearance, PartOfClearance
+from hovi.planning.clearance.clearance import MOST_GAP, Clearance, PartOfClearance
 from hovi.planning.clearance.convex_shapes import convex_geometry
 from hovi.planning.clearance.distances import Distances, distances_between
 from hovi.planning.obstacles.obstacle import Body, Obstacle
@@ -15,9 +16,12 @@ from hovi.robot.robot import Robot
 from hovi.robot.space.joint_kinds import kind_of
 
 Array = npt.NDArray[np.float64]
+Mask = npt.NDArray[np.bool_]
 
 NEVER_NEAR = 0.5
 """Distance beyond the margin, in [m], at which rows are constant, and obstacles are left out."""
+ROUNDING = 1e-9
+"""By which a pair may be nearer than it is at an end, in [m]."""
 ROTARY = "revolute", "continuous", "spherical"
 """Kinds of joints that turn about a point of the link before."""
 
@@ -42,6 +46,39 @@ def distances_within_reach(robot: Robot, clearance: Clearance) -> Distances | No
     if len(kept) == len(every.pairs):
         return every
     return every.restricted(kept) if kept else None
+
+
+def with_gaps(
+    robot: Robot,
+    clearance: Clearance,
+    boundary: tuple[Array, Array, Array, Array],
+    free: Mask,
+    duration: float,
+) -> Clearance:
+    """The clearance, by which pairs may be as near as they are at an end, up to MOST_GAP.
+
+    An end that is measured, or computed by another program, at the margin is not exactly there.
+    boundary: q and v of both ends. free: which of these are free, (2, k, nv). duration: in [s].
+    Raises as Distances does.
+    """
+    if isinstance(clearance, PartOfClearance):
+        return clearance
+    whole = dataclasses.replace(clearance, gaps=()) if clearance.gaps else clearance
+    distances, margin = distances_within_reach(robot, whole), float(whole.margin)
+    found = dict[tuple[str, str], float]()
+    if distances is None:
+        return whole
+    for i in (0, 1) if margin > MOST_GAP else ():
+        if free[i, 0].any():
+            continue
+        d = distances.values(distances.at(boundary[2 * i][None], i * duration), margin)[0]
+        for k in np.flatnonzero((d < margin) & (d >= margin - MOST_GAP)):
+            pair = distances.pairs[k].link, distances.pairs[k].other
+            found[pair] = max(found.get(pair, 0.0), margin - float(d[k]) + ROUNDING)
+    gaps = tuple((*pair, gap) for pair, gap in found.items())
+    if gaps == tuple(clearance.gaps):
+        return clearance
+    return dataclasses.replace(whole, gaps=gaps) if gaps else whole
 
 
 @lru_cache(maxsize=16)

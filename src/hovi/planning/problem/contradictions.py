@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.discrete.state import Periodic
-from hovi.planning.clearance.clearance_violation import TOUCHING, distance_in_words
+from hovi.planning.clearance.clearance_violation import less_than_margin
 from hovi.planning.problem.arms.limit_set import KIND_NAMES
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.goal_clearance import goal_in_obstacle
@@ -23,9 +23,6 @@ Mask = npt.NDArray[np.bool_]
 
 MARGIN_TOLERANCE = 1e-9
 """Distance by which an end may violate the margin, in [m]."""
-
-LETTING_LINKS_MEET = "let links meet by self_collision = false"
-"""What to do about links that are too near at an end."""
 
 
 def contradiction(problem: TrajectoryProblem, limits: Limits) -> str:
@@ -103,10 +100,8 @@ def _end_in_obstacle(problem: TrajectoryProblem) -> str:
         k = int(np.argmin(d))
         if d[k] < margin - MARGIN_TOLERANCE:
             distance = float(d[k] - problem.distances.allowance[k])
-            needed = "" if distance < TOUCHING else f", less than the margin of {margin:g} m"
-            advice = "move the obstacle" if pairs[k].obstacle else LETTING_LINKS_MEET
-            apart = f"{distance_in_words(distance)}{needed}"
-            return f"at the {end} {pairs[k]} {apart}; change the {end} or {advice}"
+            advice = f"change the {end}" + (" or move the obstacle" if pairs[k].obstacle else "")
+            return f"at the {end} {pairs[k]} {less_than_margin(distance, margin)}; {advice}"
     goals = [(problem.goal, "goal"), *((via.goal, "via point") for via in problem.via)]
     for goal, name in goals:
         if isinstance(goal, FrameGoal):

@@ -14,7 +14,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from hovi.planning.clearance.clearance_violation import TOUCHING, distance_in_words
+from hovi.planning.clearance.clearance_violation import less_than_margin
 from hovi.planning.clearance.distances import Distances, Pair
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.robot.model import frame_named
@@ -58,9 +58,9 @@ def goal_in_obstacle(goal: FrameGoal, name: str, distances: Distances, margin: f
     if not found or min(found.values()) >= margin:
         return ""
     pair = min(found, key=lambda each: found[each])
-    needed = "" if found[pair] < TOUCHING else f", less than the margin of {margin:g} m"
+    words = less_than_margin(found[pair], margin)
     least = "" if goal.rotation is not None else " or come closer"
-    apart = f"{distance_in_words(found[pair])}{least}{needed}"
+    apart = words.replace(" apart", f" apart{least}", 1) if " apart" in words else words + least
     return (
         f"with frame {goal.frame!r} at the {name}, {pair} {apart}; change the {name} or move the "
         "obstacle"

@@ -23,7 +23,7 @@ from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError
 from hovi.planning.clearance.clearance import Clearance
 from hovi.planning.clearance.distances import Distances
-from hovi.planning.clearance.within_reach import distances_within_reach
+from hovi.planning.clearance.within_reach import distances_within_reach, with_gaps
 from hovi.planning.problem.conserved_momentum import free_fall_contradiction, without_redundancy
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.goals import Via, goal_state
@@ -101,10 +101,8 @@ class TrajectoryProblem(ProblemSummary):
             raise InputError("passive joints need a Lagrangian of torques: leave them out.")
         first, last = self.start, self.goal
         if isinstance(last, Periodic):
-            timed = self.ld.lagrangian.timed
-            first, last = last.ends(self.start, self.coordinates, self.ld.k, timed)
+            first, last = last.ends(first, self.coordinates, self.ld.k, self.ld.lagrangian.timed)
         self._set_conditions(first, last)
-        _ = self.distances  # raises for missing collision shapes
 
     def _set_conditions(self, first: State, last: State | FrameGoal) -> None:
         """Set the boundary data and the conditions at nodes, from both ends and the via points."""
@@ -125,6 +123,9 @@ class TrajectoryProblem(ProblemSummary):
             independent = without_redundancy(self.scene, self.boundary[3], self.free_ends)
             object.__setattr__(self, "free_ends", independent)
         object.__setattr__(self, "unreachable", unreachable)
+        if self.clearance is not None:  # raises for missing collision shapes
+            ends = self.boundary, self.free_ends, self.grid.duration
+            object.__setattr__(self, "clearance", with_gaps(self.robot, self.clearance, *ends))
 
     def _set_ends(self, start: State, goal: State, at_start: tuple[Array, Array]) -> None:
         """Set what both ends prescribe and leave free. at_start: q and v there."""
@@ -357,10 +358,7 @@ class TrajectoryProblem(ProblemSummary):
 
     @property
     def scene(self) -> Scene:
-        """The scene that the Lagrangian, or that of the first segment, belongs to.
-
-        Raises InputError if it is about no robot.
-        """
+        """The scene of the Lagrangian, or of the first segment. InputError if there is no robot."""
         if self._scene is not None:
             return self._scene
         raise InputError(

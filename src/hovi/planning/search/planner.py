@@ -12,7 +12,9 @@ from hovi.discrete.grid import Grid
 from hovi.discrete.output.caution import COLLISION, LEFT_OUT, STATUS, WARNED, Caution
 from hovi.discrete.state import State, warn_of_degrees
 from hovi.discrete.trajectory import Trajectory
-from hovi.errors import InputError, SceneError, expect, warn
+from hovi.errors import InputError, ModelError, SceneError, expect, warn
+from hovi.planning.clearance.clearance import Clearance
+from hovi.planning.clearance.distances import distances_between
 from hovi.planning.clearance.hull_overlaps import HullOverlap, hull_overlaps, met_sentence
 from hovi.planning.clearance.self_collisions import not_looked_at, pairs_left_out
 from hovi.planning.problem.frame_goal import FrameGoal
@@ -200,6 +202,12 @@ def _notes(found: Solution, scenes: Sequence[Scene], options: PlanOptions) -> It
     if options.self_collision and problem is not None and problem.clearance is not None:
         for each in pairs_left_out(problem.robot, tuple(problem.clearance.may_touch)):
             yield Caution(WARNED, each)
+    for link, other, gap in () if problem is None else (problem.clearance or Clearance()).gaps:
+        yield Caution(
+            LEFT_OUT,
+            f"{link!r} and {other!r} are {gap:.2g} m nearer than the margin at an end, and may be "
+            "so all along.",
+        )
 
 
 def run(search: Search, began: float) -> Solution:
@@ -261,7 +269,12 @@ def kept_apart(
         if isinstance(end, State) and not end.free
     }
     overlaps = hull_overlaps(robot, decided.clearance, whole)
-    return decided.leaving_out([each.links for each in overlaps]), Apart(overlaps)
+    left = decided.leaving_out([each.links for each in overlaps])
+    try:
+        distances_between(robot, left.clearance)
+    except ModelError:  # all pairs are left out
+        left = decided.with_changes(self_collision=False)
+    return left, Apart(overlaps)
 
 
 def holding(scene: Scene, options: PlanOptions) -> Scene:

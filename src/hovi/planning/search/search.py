@@ -77,7 +77,8 @@ class Search:
 
     def _of_whole(self, free: Solution) -> Solution | None:
         """A solution without self-collision as one with; None if links come too near in it."""
-        clearance, problem = self.fine.options.clearance, free.problem or self.fine.problem()
+        clearance, problem = self.fine.problem().clearance, free.problem or self.fine.problem()
+        assert clearance is not None
         problem = with_clearance(on_grid_of(problem, free), clearance)
         kept, near = dataclasses.replace(free, problem=problem), 0
         ended = free.status in (*STOPPED, Status.INFEASIBLE) or interrupted()

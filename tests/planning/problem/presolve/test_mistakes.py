@@ -433,9 +433,11 @@ def planned(task: Mapping[str, Any]) -> hovi.Solution:
     robot, effects = hovi.load_robot(rest.pop("robot"), free_flyer=free), rest.pop("effects")
     scene, start = hovi.Scene(robot, effects), rest.pop("start")
     if "segments" in rest:
-        return hovi.plan_sequence(scene, start, rest.pop("segments"), **rest, self_collision=False)
+        return hovi.plan_sequence(
+            scene, start, rest.pop("segments"), **({"self_collision": False} | rest)
+        )
     return hovi.plan(
-        scene, start, rest.pop("goal"), rest.pop("duration"), **rest, self_collision=False
+        scene, start, rest.pop("goal"), rest.pop("duration"), **({"self_collision": False} | rest)
     )
 
 
@@ -525,7 +527,7 @@ def test_a_task_without_mistakes_is_planned_without_a_word(command: Any) -> None
     error, told, message = sentences(ARM)
     assert (error, told) == ("", [])
     assert message.startswith("a minimum of cost")
-    code, printed = command(ARM)
+    code, printed = command({"format": 2, **ARM})
     assert code == 0
     assert "note: " not in printed
     assert "warning: " not in printed

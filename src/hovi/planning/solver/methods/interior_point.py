@@ -37,8 +37,14 @@ STEPS_AT_POINTS = 200
 
 
 def takes_rows(problem: TrajectoryProblem) -> bool:
-    """Whether distances can be bounded by rows where pairs come near."""
-    return problem.distances is not None and problem.ld.chart is None
+    """Whether distances can be bounded by rows where pairs come near.
+
+    Without limits only where links are kept apart, of which many pairs are near at once.
+    """
+    if problem.distances is None or problem.clearance is None or problem.ld.chart is not None:
+        return False
+    limited = problem.limits is not None and bool(problem.limits.bounded.any())
+    return limited or problem.clearance.self_collision
 
 
 class InteriorPoint(Method):
