@@ -24,7 +24,9 @@ LEFT, RIGHT = np.array([0.2, -0.3, 0.0, 0.0]), np.array([0.0, 0.0, 0.3, 0.4])
 def motion(robot: Robot, step: Array) -> Trajectory:
     scene, start = Scene(robot, [Gravity()]), robot.neutral() + 0.1
     options = {"limits": "none", "intervals": 8}
-    return plan(scene, State(start), State(start + step), 1.0, **options).trajectory
+    return plan(
+        scene, State(start), State(start + step), 1.0, self_collision=False, **options
+    ).trajectory
 
 
 @pytest.fixture(scope="module")
