@@ -104,6 +104,15 @@ def test_a_replaced_file_keeps_its_permissions(tmp_path: Path) -> None:
     assert path.stat().st_mode & 0o777 == 0o600
 
 
+def test_permissions_that_the_writer_gives_are_those_of_the_file(tmp_path: Path) -> None:
+    path = tmp_path / "library"
+    path.write_bytes(b"old")
+    path.chmod(0o666)
+    with whole_file(path) as stream:
+        os.fchmod(stream.fileno(), 0o600)
+    assert path.stat().st_mode & 0o777 == 0o600
+
+
 def test_a_file_and_its_name_are_on_the_disk_when_it_is_written(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -36,10 +36,10 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
     temporary = target.with_name(f".{target.name[:50]}.{os.urandom(6).hex()}.tmp")  # 255 bytes
     try:
         with _open(temporary) as stream:
+            if target.exists():  # before the block, which may give it others
+                os.fchmod(stream.fileno(), stat.S_IMODE(target.stat().st_mode))
             yield stream
             stream.flush()
-            if target.exists():
-                os.fchmod(stream.fileno(), stat.S_IMODE(target.stat().st_mode))
             os.fsync(stream.fileno())
             if not temporary.exists():
                 _link(stream, temporary)
