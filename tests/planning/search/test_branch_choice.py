@@ -23,7 +23,7 @@ def scene(ur5: Robot) -> hovi.Scene:
 
 
 def test_the_branch_with_the_cheapest_motion_is_chosen(ur5: Robot, scene: hovi.Scene) -> None:
-    """Not the nearest one: of the motions to all eight, planned one by one."""
+    """Not the nearest one: no dearer than the motions to all eight, planned from their cubics."""
     random = np.random.default_rng(3)
     for _ in range(3):
         start, q = random.uniform(-2.5, 2.5, (2, 6))
@@ -38,7 +38,7 @@ def test_the_branch_with_the_cheapest_motion_is_chosen(ur5: Robot, scene: hovi.S
         costs.append(motion.cost if motion.success else np.inf)
     chosen = hovi.plan(scene, start, goal, 1.5, continuation=False, **FAST, self_collision=False)
     assert np.argmin(costs) != 0
-    assert chosen.cost == pytest.approx(min(costs), rel=1e-9)
+    assert chosen.cost <= min(costs) * (1 + 1e-9)
 
 
 def test_a_motion_begins_and_ends_at_frames(ur5: Robot, scene: hovi.Scene) -> None:
@@ -56,11 +56,11 @@ def test_a_start_near_a_given_goal_is_its_own_branch(ur5: Robot, scene: hovi.Sce
     q = np.array([0.3, -1.2, 1.3, -0.7, 0.8, 0.0])
     start = hovi.FrameGoal("tool0", ur5.frame_pose("tool0", q))
     options = PlanOptions().on(scene)
-    first, _ = chosen_ends(scene, start, hovi.State(q + 0.2), 1.0, options, Deadline())
+    first = chosen_ends(scene, start, hovi.State(q + 0.2), 1.0, options, Deadline()).start
     np.testing.assert_allclose(first.q, q, atol=1e-8)
     turn = np.array([0, 0, 0, 0, 0, 2 * np.pi])
     turned = dataclasses.replace(start, guess=q - turn)
-    first, _ = chosen_ends(scene, turned, hovi.State(q + 0.2), 1.0, options, Deadline())
+    first = chosen_ends(scene, turned, hovi.State(q + 0.2), 1.0, options, Deadline()).start
     np.testing.assert_allclose(first.q, q - turn, atol=1e-8)
 
 
@@ -70,7 +70,7 @@ def test_branches_in_an_obstacle_are_not_chosen(ur5: Robot, scene: hovi.Scene) -
     ball = hovi.Sphere(ur5.frame_position("forearm_link", q[None])[0], 0.02)
     for obstacles, is_taken in (((), True), ((ball,), False)):
         options = PlanOptions(obstacles=obstacles).on(scene)
-        _, end = chosen_ends(scene, hovi.State(start), goal, 3.0, options, Deadline())
+        end = chosen_ends(scene, hovi.State(start), goal, 3.0, options, Deadline()).goal
         assert isinstance(end, hovi.FrameGoal)
         assert (np.abs(np.asarray(end.guess) - q).max() < 1e-6) == is_taken
 

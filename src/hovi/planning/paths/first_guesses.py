@@ -27,18 +27,20 @@ PATH_SHARE = 0.2
 class FirstGuesses:
     """A direct guess, how deep in obstacles it is, in [m], and guesses along paths around them.
 
-    further: draws other paths, where there are any.
+    further: draws other paths, where there are any. branches: guesses to other configurations at
+    the goal.
     """
 
     direct: DiscretePath
     depth: float = -np.inf
     paths: tuple[DiscretePath, ...] = ()
     further: Callable[[], Sequence[DiscretePath]] = tuple
+    branches: tuple[DiscretePath, ...] = ()
 
     @property
     def all(self) -> tuple[DiscretePath, ...]:
-        """The paths, then the direct guess."""
-        return (*self.paths, self.direct)
+        """The paths, then the direct guess, then those to other branches."""
+        return (*self.paths, self.direct, *self.branches)
 
     def sentence(self, by_path: bool, success: bool) -> str:
         """What the message of a solution says of its guess, "" if nothing.

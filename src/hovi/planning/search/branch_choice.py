@@ -1,33 +1,40 @@
 """Which configurations a motion between frames begins and ends at: the branches compared by cost.
 
 A frame is at its goal in several configurations, the branches of inverse kinematics, between which
-the cost of the best motion differs by factors. Those that keep the limits and the margin from
-obstacles are ordered by their distance to the other end. The nearest of them are compared by the
-cost of the cubic that leads there, which takes a millisecond; and those whose cubics cost nearly as
-little as the cheapest one, and the nearest, by a motion within the limits on a few intervals.
+the cost of the best motion differs by factors. The cost of a cubic says little about that of the
+best motion, so that a motion within the limits is solved for each branch, on a few intervals; where
+a branch allows full turns of joints, the ones with the cheapest cubics are solved for, too. Where
+the joints are more than the equations, branches are members of families, along which the end of
+each of these motions is free to move.
 """
 
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Iterator
 
 import numpy as np
 import numpy.typing as npt
 
 from hovi.discrete.grid import Grid
+from hovi.discrete.guess import Curve
 from hovi.discrete.state import State
+from hovi.discrete.trajectory import Trajectory
 from hovi.errors import HoviError, UnreachableError
+from hovi.planning.paths.rough_motions import rough_motions
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.inverse_kinematics import (
     configurations,
     first_configuration,
     position_bounds,
 )
+from hovi.planning.problem.kinematics.cubic_costs import cubic_costs
+from hovi.planning.problem.kinematics.full_turns import with_full_turns
 from hovi.planning.problem.limits import as_limits
 from hovi.planning.problem.problem import LIMITED_ORDERS, TrajectoryProblem
 from hovi.planning.search.job import Job
 from hovi.planning.search.options import PlanOptions
-from hovi.planning.solver.solver import solve_on_grid
+from hovi.planning.solver.solver import Solution, solve_on_grid
 from hovi.planning.solver.status import Status
 from hovi.scene.scene import Scene
 from hovi.schemes import by_name, of_order
@@ -35,24 +42,39 @@ from hovi.system.dataclass import dataclass
 from hovi.system.deadline import Deadline, OutOfTimeError
 
 Array = npt.NDArray[np.float64]
-Ends = tuple[State, State | None]
 
-COMPARED = 8
-"""Number of branches whose cubics are compared, those nearest to the other end."""
-NEARLY = 1.25
-"""Ratio to the cheapest cubic up to which branches are compared by a motion within the limits."""
-SOLVED = 4
-"""Largest number of these motions besides the one to the nearest branch."""
-COMPARED_STARTS = 4
-"""Number of starts from which the branches of a frame goal are compared."""
-INTERVALS = 8
+SOLVED = 16
+"""Largest number of pairs of ends between which a motion is solved for."""
+TURNED = 4
+"""Largest number of pairs with full turns among them."""
+ROUGH, FROM_ROUGH = 3, 6
+"""Number of rough motions between each pair, from random bumps, and of pairs for which a motion is
+solved for from the best of them, besides that from the cubic."""
+INTERVALS = 4
 """Number of intervals of these motions."""
-LAST_BARRIER = 1e-3
+LAST_BARRIER = 1e-2
 """Last barrier parameter of these motions, relative to the mean density of their cost."""
 STEPS = 40
 """Largest number of steps towards each of them."""
 SHARE = 0.2
 """Share of a time limit for the choice."""
+
+
+@dataclass(frozen=True, eq=False)
+class Ends:
+    """The ends of a plan: the branches between which the motion is the cheapest, and others.
+
+    start, goal: of the plan; a goal of a frame has the branch as its guess.
+    compared: number of pairs of branches that were compared. motion: between the ends, on a few
+        intervals; None where nothing was compared. others: motions from the same start to other
+        branches, the cheapest first.
+    """
+
+    start: State
+    goal: State | FrameGoal
+    compared: int = 1
+    motion: Trajectory | None = None
+    others: tuple[Trajectory, ...] = ()
 
 
 def chosen_ends(
@@ -62,7 +84,7 @@ def chosen_ends(
     duration: float,
     options: PlanOptions,
     deadline: Deadline,
-) -> tuple[State, State | FrameGoal]:
+) -> Ends:
     """The start as a state, and the goal with the branch to which the motion is the cheapest.
 
     A start is the branch itself; of a goal it is the guess of inverse kinematics, if it has none.
@@ -70,13 +92,8 @@ def chosen_ends(
     Raises UnreachableError for a start that cannot be met; a goal then stays as it is.
     """
     if isinstance(start, State) and (isinstance(goal, State) or goal.guess is not None):
-        return start, goal
-    choice = _Choice(scene, duration, options, deadline.part(SHARE))
-    pairs = choice.pairs(start, goal)
-    first, last = pairs[choice.cheapest(pairs)]
-    if isinstance(goal, State) or goal.guess is not None or last is None:
-        return first, goal
-    return first, dataclasses.replace(goal, guess=last.on(scene.robot, "goal")[0])
+        return Ends(start, goal)
+    return _Choice(scene, start, goal, duration, options, deadline.part(SHARE)).ends()
 
 
 def nearest_ends(
@@ -91,9 +108,17 @@ def nearest_ends(
             end.check(scene.robot)
     if isinstance(start, State):
         return start, goal
-    alone = _Choice(scene, 0.0, options, Deadline())
-    near = None if isinstance(goal, FrameGoal) else goal.on(scene.robot, "goal")[0]
-    return alone.branches(start, near)[0], goal
+    alone = _Choice(scene, start, goal, 0.0, options, Deadline())
+    return alone.starts()[0], goal
+
+
+@dataclass(frozen=True, eq=False)
+class _Pair:
+    """A start and a configuration at the goal, (nq,). turned: whether by further full turns."""
+
+    start: State
+    q: Array
+    turned: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,70 +126,155 @@ class _Choice:
     """A plan whose ends are to be chosen: see `chosen_ends`. deadline: of the choice."""
 
     scene: Scene
+    start: State | FrameGoal
+    goal: State | FrameGoal
     duration: float
     options: PlanOptions
     deadline: Deadline
 
-    def pairs(self, start: State | FrameGoal, goal: State | FrameGoal) -> list[Ends]:
-        """Pairs of a start and a state at the goal, None if it cannot be met; the nearest first."""
-        near = None if isinstance(goal, FrameGoal) else self._configuration(goal)
-        starts = [start] if isinstance(start, State) else self.branches(start, near)
-        if isinstance(goal, State):
-            return [(each, goal) for each in starts[:COMPARED]]
-        pairs: list[Ends] = []
-        for each in starts[:COMPARED_STARTS]:
-            try:
-                ends = self.branches(goal, self._configuration(each))
-            except UnreachableError:
-                return [(each, None)]
-            pairs += [(each, end) for end in ends[: COMPARED // min(len(starts), COMPARED_STARTS)]]
-        return pairs
+    def ends(self) -> Ends:
+        """The ends of the cheapest motion; the nearest ones if no motion is found."""
+        starts = self.starts()
+        try:
+            pairs = [pair for start in starts for pair in self._pairs(start)]
+        except UnreachableError:
+            return Ends(starts[0], self.goal)
+        known = self.scene.order in LIMITED_ORDERS and not self.scene.passive
+        solved = self._solved(pairs) if known and len(pairs) > 1 else []
+        if not solved:
+            return Ends(pairs[0].start, self._goal_at(pairs[0].q))
+        (best, cheapest), *rest = solved
+        goal = self._goal_at(best.q)
+        motion, *others = [
+            None if found.status in _WITHOUT_MOTION else found.trajectory
+            for pair, found in [(best, cheapest), *rest]
+            if pair.start is best.start
+        ]
+        other_motions = tuple(other for other in others if other is not None)
+        return Ends(best.start, goal, len(solved), motion, other_motions)
 
-    def branches(self, goal: FrameGoal, near: Array | None) -> list[State]:
-        """The states in which a frame meets its goal: that at the guess alone if it has one."""
+    def starts(self) -> list[State]:
+        """The states at which the motion may begin, the nearest to the goal first."""
+        if isinstance(self.start, State):
+            return [self.start]
+        near = None if isinstance(self.goal, FrameGoal) else self._configuration(self.goal)
+        velocity = tuple(self.start.free_velocity)
+        return [State(q, free_velocity=velocity) for q in self._branches(self.start, near)]
+
+    def _branches(self, goal: FrameGoal, near: Array | None) -> Array:
+        """Configurations in which a frame meets its goal: that at the guess alone if it has one."""
         robot, options = self.scene.robot, self.options
-        bounds = position_bounds(robot, as_limits(robot, options.limits))
-        first = first_configuration(robot, goal, near if goal.guess is None else None, bounds)
-        found = configurations(robot, goal, first, bounds, options.clearance)
-        chosen = found if goal.guess is None else found[:1]
-        return [State(q, free_velocity=tuple(goal.free_velocity)) for q in chosen]
+        first = first_configuration(robot, goal, near if goal.guess is None else None, self._bounds)
+        found = configurations(robot, goal, first, self._bounds, options.clearance)
+        return found if goal.guess is None else found[:1]
+
+    def _pairs(self, start: State) -> list[_Pair]:
+        """A start with all branches of the goal, each followed by what full turns make of it."""
+        goal, robot = self.goal, self.scene.robot
+        if isinstance(goal, State):
+            return [_Pair(start, self._configuration(goal), False)]
+        near = self._configuration(start)
+        found = self._branches(goal, near)
+        if goal.guess is not None:
+            return [_Pair(start, q, False) for q in found]
+        return [
+            _Pair(start, q, number > 0)
+            for branch in found
+            for number, q in enumerate(
+                with_full_turns(robot, goal.frame, branch, near, self._bounds)
+            )
+        ]
+
+    @property
+    def _bounds(self) -> tuple[Array, Array]:
+        return position_bounds(self.scene.robot, as_limits(self.scene.robot, self.options.limits))
 
     def _configuration(self, state: State) -> Array:
         return state.on(self.scene.robot, "start")[0]
 
-    def cheapest(self, pairs: list[Ends]) -> int:
-        """Index of the pair of ends between which the motion costs least; the first if unknown."""
-        known = self.scene.order in LIMITED_ORDERS and not self.scene.passive
-        if len(pairs) == 1 or not known:
-            return 0
+    def _goal_at(self, q: Array) -> State | FrameGoal:
+        """The goal with a configuration as its guess, if it has none."""
+        goal = self.goal
+        if isinstance(goal, State) or goal.guess is not None:
+            return goal
+        return dataclasses.replace(goal, guess=q)
+
+    def _solved(self, pairs: list[_Pair]) -> list[tuple[_Pair, Solution]]:
+        """Motions between pairs of ends on a few intervals, the cheapest first.
+
+        Those that are solved for until the deadline, one for each pair.
+        """
+        found = dict[int, tuple[_Pair, Solution]]()
         try:
             with self.deadline.in_force():
-                return self._compared(pairs)
+                for number, curve in self._guesses(pairs):
+                    problem = self._problem(pairs[number])
+                    guess = "cubic" if curve is None else problem.path(curve)
+                    motion = solve_on_grid(
+                        problem, guess, max_iterations=STEPS, barrier=LAST_BARRIER
+                    )
+                    known = found.get(number)
+                    if known is None or _rank(motion) < _rank(known[1]):
+                        found[number] = pairs[number], motion
         except (OutOfTimeError, HoviError):
-            return 0
+            pass
+        return sorted(found.values(), key=lambda each: _rank(each[1]))
 
-    def _compared(self, pairs: list[Ends]) -> int:
-        problems = [self._problem(start, goal) for start, goal in pairs if goal is not None]
-        cubics = [problem.ld.action(problem.guess("cubic")) for problem in problems]
-        order = np.argsort(cubics, kind="stable")
-        best = cubics[order[0]]
-        cheap = [int(i) for i in order[:SOLVED] if cubics[i] <= NEARLY * best]
-        compared = sorted({0, *cheap})
-        if len(compared) == 1:
-            return 0
-        return min(compared, key=lambda i: self._cost(problems[i]))
+    def _guesses(self, pairs: list[_Pair]) -> Iterator[tuple[int, Curve | None]]:
+        """Numbers of pairs and guesses, None for the cubic: those first that promise most."""
+        chosen, robot = self._promising(pairs), self.scene.robot
+        if not robot.space.flat or self.scene.terms.timed:
+            yield from ((number, None) for number in chosen)
+            return
+        q0, q1 = (np.array([each(pairs[i]) for i in chosen]) for each in (self._q0, _q1))
+        v0 = np.array([pairs[i].start.on(robot, "start")[1] for i in chosen])
+        lagrangian = self.scene.effort_lagrangian(self.options.weight)
+        limits = as_limits(robot, self.options.limits)
+        rough = [
+            rough_motions(lagrangian, robot, limits, (q0, q1, v0), self.duration, seed)
+            for seed in range(ROUGH)
+        ]
+        best = np.argmin([each.cost for each in rough], axis=0)
+        order = np.argsort([rough[b].cost[i] for i, b in enumerate(best)], kind="stable")
+        for rank, i in enumerate(order):
+            if rank < FROM_ROUGH:
+                yield chosen[i], rough[best[i]].curve(int(i))
+        yield from ((chosen[i], None) for i in order)
 
-    def _problem(self, start: State, goal: State) -> TrajectoryProblem:
-        """The motion between two states on a few intervals, within the limits."""
+    def _promising(self, pairs: list[_Pair]) -> list[int]:
+        """Up to SOLVED pairs: the ones without further turns, and the cheapest cubics of others."""
+        lagrangian = self.scene.effort_lagrangian(self.options.weight)
+        q0, q1 = (np.array([each(pair) for pair in pairs]) for each in (self._q0, _q1))
+        cost = cubic_costs(lagrangian, self.scene.robot, q0, q1, self.duration)
+        order = np.argsort(np.where(np.isfinite(cost), cost, np.inf), kind="stable")
+        turned = [int(i) for i in order if pairs[i].turned][:TURNED]
+        others = [int(i) for i in order if not pairs[i].turned]
+        return others[: SOLVED - len(turned)] + turned
+
+    def _q0(self, pair: _Pair) -> Array:
+        return self._configuration(pair.start)
+
+    def _problem(self, pair: _Pair) -> TrajectoryProblem:
+        """The motion between two ends on a few intervals, within the limits."""
         scheme = of_order(by_name("galerkin-2"), self.scene.order)
         grid = Grid.uniform(self.duration, INTERVALS, scheme)
         limits = as_limits(self.scene.robot, self.options.limits).first_kinds
         options = self.options.with_changes(
             via=(), obstacles=(), self_collision=False, limits=limits
         )
-        return Job(self.scene, grid, start, goal, options).problem()
+        goal = self.goal
+        if isinstance(goal, FrameGoal):
+            goal = State(pair.q, free_velocity=tuple(goal.free_velocity))
+        return Job(self.scene, grid, pair.start, goal, options).problem()
 
-    def _cost(self, problem: TrajectoryProblem) -> tuple[bool, float]:
-        """Whether no motion within the limits is found, and the cost of the best one."""
-        found = solve_on_grid(problem, max_iterations=STEPS, barrier=LAST_BARRIER)
-        return found.status in (Status.INFEASIBLE, Status.DIVERGED), found.cost
+
+_WITHOUT_MOTION = Status.INFEASIBLE, Status.DIVERGED
+
+
+def _q1(pair: _Pair) -> Array:
+    return pair.q
+
+
+def _rank(found: Solution) -> tuple[bool, bool, float]:
+    """Whether no motion within the limits is found, or no minimum, and the cost of the best one."""
+    return found.status in _WITHOUT_MOTION, not found.success, found.cost

@@ -45,6 +45,9 @@ PERTURBED_MINIMA = 4
 """Number of minima that a round perturbs."""
 COMPARED_TIMES = 17
 """Number of times at which motions are compared."""
+FURTHER_BRANCHES = 3
+"""Number of other guesses to branches of a frame goal that a single start tries if the first one
+leads nowhere."""
 SAME_COST = 1e-6
 """Relative difference in cost up to which two minima count as the same."""
 
@@ -206,7 +209,7 @@ def explore(
     KeyboardInterrupt and the pool's deadline end the exploration with the solutions so far, and so
     does a round of which every process dies.
     """
-    if starts == 1 and first.paths:
+    if starts == 1 and (first.paths or first.branches):
         return _from_path_or_direct(pool, first, progress)
     one = pool.solve_all(first.all[:starts])
     solutions, lost = one.solutions, one.lost
@@ -234,14 +237,14 @@ def explore(
 
 
 def _from_path_or_direct(pool: Pool, first: FirstGuesses, progress: Progress) -> Exploration:
-    """A single start: the first path, and other guesses while no solution is found.
+    """A single start: the first path or branch, and other guesses while no solution is found.
 
     A motion that is left, as at an iteration limit, ends the search among rows of distances: from
     there more steps are closer to a minimum than another guess is.
     """
     from hovi.planning.solver.methods.interior_point import WITHOUT_MOTION, takes_rows  # 10 ms
 
-    rows = pool.free is None and takes_rows(pool.job.problem())
+    rows = bool(first.paths) and pool.free is None and takes_rows(pool.job.problem())
     tried, by_path, stopped = list[Solution](), list[Trajectory](), False
     closer = False  # whether a motion is worth more steps
     for attempt in _attempts(first, rows):
@@ -283,17 +286,23 @@ def _attempts(first: FirstGuesses, rows: bool) -> Iterator[_Attempt]:
 
     The last two attempts have distances at quadrature points instead, which takes far longer.
     """
-    path, direct = first.paths[0], first.direct
     way: DistancesAt | None = "rows" if rows else None
+    direct = _Attempt(first.direct, False, way, "from the direct guess")
+    if not first.paths:
+        yield direct
+        for branch in first.branches[:FURTHER_BRANCHES]:
+            yield _Attempt(branch, False, way, "from another guess to the goal")
+        return
+    path = first.paths[0]
     yield _Attempt(path, True, way, "from a path")
-    yield _Attempt(direct, False, way, "from the direct guess")
+    yield direct
     if not rows:
         return
     for further in first.further():
         yield _Attempt(further, True, way, "from another path")
     at_points = ", distances at quadrature points"
     yield _Attempt(path, True, "points", f"from the path{at_points}")
-    yield _Attempt(direct, False, "points", f"from the direct guess{at_points}")
+    yield dataclasses.replace(direct, way="points", text=f"from the direct guess{at_points}")
 
 
 def _round(

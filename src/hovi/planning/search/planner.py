@@ -27,7 +27,7 @@ from hovi.planning.problem.presolve.length_slips import grasped_slips
 from hovi.planning.problem.units import Duration, as_duration
 from hovi.planning.refinement.adaptive import first_grid
 from hovi.planning.refinement.faults.cautions import keeping_warnings, with_cautions_of_motion
-from hovi.planning.search.branch_choice import chosen_ends, nearest_ends
+from hovi.planning.search.branch_choice import Ends, chosen_ends, nearest_ends
 from hovi.planning.search.final_stages import on_grid_of
 from hovi.planning.search.free_duration import FreeDuration
 from hovi.planning.search.group import in_group, with_others
@@ -157,14 +157,16 @@ def plan(
         nothing = unresolved_at_once(problem, chosen.guess, fault)
         seconds = time.perf_counter() - began
         return with_notes(nothing, [job.scene], job.options, apart, seconds)
+    ends = Ends(job.start, job.goal)
     if FrameGoal in map(type, given):
         ends = chosen_ends(scene, *given, T, chosen, deadline)
-        job = search.job(ends, deadline, job.scene if ends[0] is job.start else None)
+        known = job.scene if ends.start is job.start else None
+        job = search.job((ends.start, ends.goal), deadline, known)
     without = None
     if chosen.self_collision:
         loose = dataclasses.replace(search, options=chosen.with_changes(self_collision=False))
         without = loose.job((job.start, job.goal), deadline, job.scene)
-    solution = run(Search(job, deadline, progress or silent, free, without), began)
+    solution = run(Search(job, deadline, progress or silent, free, without, ends), began)
     return with_notes(solution, [job.scene], job.options, apart)
 
 

@@ -15,6 +15,7 @@ from hovi.planning.refinement.faults.narrow_features import NARROW
 from hovi.planning.refinement.hp_refinement import galerkin_with_more_points
 from hovi.planning.refinement.resolution import Resolution, resolved, unresolved_if_whirling
 from hovi.planning.refinement.whirling import whirl_without_minimum
+from hovi.planning.search.branch_choice import Ends
 from hovi.planning.search.continuation import STOPPED, UNUSABLE, may_help, solve_by_continuation
 from hovi.planning.search.final_stages import (
     MAX_REFINED,
@@ -51,6 +52,7 @@ class Search:
     fine: the requested job, with the guess among its options. deadline: of the whole search.
     free: bounds of a free duration; None for a given one.
     without: the same without self-collision, which is searched first; None where there is none.
+    free: bounds of a free duration; None for a given one. ends: as they were chosen from branches.
     """
 
     fine: Job
@@ -58,6 +60,7 @@ class Search:
     progress: Progress
     free: FreeDuration | None = None
     without: Job | None = None
+    ends: Ends | None = None
 
     def run(self) -> tuple[Solution, tuple[float, ...]]:
         """The best solution, and the costs of all minima on the requested grid.
@@ -224,7 +227,12 @@ class Search:
         if not isinstance(options.guess, str):
             return FirstGuesses(direct)
         given = options.starts, options.seed, deadline, self.progress
-        return first_guesses(problem, direct, *given)
+        if self.ends is None or self.ends.motion is None:
+            return first_guesses(problem, direct, *given)
+        found = first_guesses(problem, guess_path(problem, self.ends.motion), *given)
+        others = [guess_path(problem, motion) for motion in self.ends.others]
+        branches = [direct, *others] if options.starts == 1 else [*others, direct]
+        return dataclasses.replace(found, branches=tuple(branches))
 
     def _continued(self, job: Job, found: list[Solution]) -> list[Solution]:
         """The solutions, or the result of continuation if there is no minimum among them."""
@@ -264,6 +272,8 @@ class Search:
         starts, lost = self.fine.options.starts, len(explored.lost)
         if led := explored.guess_of(best.trajectory):
             best = _with_note(best, led)
+        if self.ends is not None and self.ends.compared > 1:
+            best = _with_note(best, f"{self.ends.compared} branches of the ends were compared.")
         if explored.done + lost < starts:
             best = _with_note(best, f"The search ended after {explored.done} of {starts} starts.")
         elif interrupted() and best.success:

@@ -19,6 +19,7 @@ from hovi.errors import UnreachableError
 from hovi.planning.clearance.clearance import Clearance
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.inverse_kinematics import Bounds, configurations, first_configuration
+from hovi.planning.problem.kinematics.cubic_costs import cubic_costs
 from hovi.robot.robot import Robot
 from hovi.scene.lagrangian import Lagrangian
 from hovi.system.dataclass import dataclass
@@ -30,8 +31,6 @@ COMPARED = 8
 """Number of branches of a goal that are compared, the nearest ones to the goal before it."""
 UNKNOWN_COST = 1e200
 """Cost of a cubic whose cost is not finite."""
-POINTS, WEIGHTS = np.polynomial.legendre.leggauss(8)
-"""Gauss points in [-1, 1] and their weights, by which the cost of a cubic is integrated."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,7 +104,8 @@ def _next_layer(
         q, known = last.q[:1], False
     K, M = len(last.q), len(q)
     pairs = np.repeat(last.q, M, axis=0), np.tile(q, (K, 1))
-    cost = last.cost[:, None] + _costs(lagrangian, leg, *pairs).reshape(K, M)
+    costs = cubic_costs(lagrangian, robot, *pairs, leg.end - leg.begin, leg.begin)
+    cost = last.cost[:, None] + costs.reshape(K, M)
     cost = np.where(np.isfinite(cost), cost, UNKNOWN_COST)
     before = np.argmin(cost, axis=0)
     return _Layer(q, cost[before, np.arange(M)], before, known)
@@ -119,15 +119,3 @@ def _branches(robot: Robot, leg: Leg, near: Array | None, clearance: Clearance) 
     first = first_configuration(robot, end, near if end.guess is None else None, leg.bounds)
     found = configurations(robot, end, first, leg.bounds, clearance)
     return found[: 1 if end.guess is not None else COMPARED]
-
-
-def _costs(lagrangian: Lagrangian, leg: Leg, q0: Array, q1: Array) -> Array:
-    """The costs of cubics between pairs of configurations at rest, with nq = nv, shape (P,)."""
-    T, s = leg.end - leg.begin, (POINTS + 1) / 2
-    x = [s**2 * (3 - 2 * s), 6 * s * (1 - s) / T, (6 - 12 * s) / T**2, -12 * s**0 / T**3]
-    step = q1 - q0
-    jet = [(row[:, None, None] * step).reshape(-1, step.shape[1]) for row in x]
-    jet[0] += np.tile(q0, (len(s), 1))
-    t = np.repeat(leg.begin + s * T, len(q0))
-    value = lagrangian.value(*jet[: lagrangian.order + 1], t=t)
-    return np.asarray(WEIGHTS @ value.reshape(len(s), -1)) * T / 2
