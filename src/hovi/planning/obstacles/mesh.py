@@ -52,12 +52,11 @@ class ConvexParts(Obstacle):
             raise InputError(
                 f"`radius` of convex parts must be a length of 0 or more, got {self.radius!r}."
             )
-        if (
-            not isinstance(self.parts, Sequence | np.ndarray)
-            or not 0 < len(self.parts) <= MAX_PARTS
-        ):
+        given = self.parts
+        listed = isinstance(given, Sequence) or (isinstance(given, np.ndarray) and given.ndim > 0)
+        if not listed or not 0 < len(given) <= MAX_PARTS:
             raise InputError(f"`parts` of convex parts must be 1 to {MAX_PARTS} lists of points.")
-        object.__setattr__(self, "parts", tuple(ConvexHull(each).points for each in self.parts))
+        object.__setattr__(self, "parts", tuple(ConvexHull(each).points for each in given))
 
     def bodies(self) -> tuple[Body, ...]:
         """A hull for each part."""

@@ -11,7 +11,7 @@ import pinocchio as pin
 
 from hovi.checks.arguments import check_arguments_except
 from hovi.errors import InputError
-from hovi.planning.obstacles.obstacle import Body, Obstacle, pose_of
+from hovi.planning.obstacles.obstacle import MIN_LENGTH, Body, Obstacle, pose_of
 from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
@@ -54,9 +54,10 @@ class PointCloud(Obstacle):
             raise InputError(
                 f"`points` of a point cloud must be 1 to {MAX_CLOUD_POINTS:,} points, got {count}."
             )
-        if self.cell < 0:
+        if self.cell != 0.0 and self.cell < MIN_LENGTH:
             raise InputError(
-                f"`cell` of a point cloud must be a length of 0 or more, got {self.cell!r}."
+                f"`cell` of a point cloud must be 0 or a length of at least {MIN_LENGTH:g} m, got "
+                f"{self.cell!r}."
             )
         if len(self.spheres) > MAX_SPHERES:
             raise InputError(
