@@ -39,6 +39,7 @@ KINDS = {
     "compiled": ("hard.compiled_calls", 14_000),
     "api": ("hard.api_calls", 14_000),
     "mesh": ("hard.mutated_mesh", 3_000),
+    "mjcf": ("hard.mutated_mjcf", 5_000),
     "surface": ("hard.mutated_surface", 10_000),
 }
 HANG, STARTUP = 10.0, 120.0  # [s]

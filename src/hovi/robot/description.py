@@ -147,6 +147,7 @@ def _notes(model: pin.Model, source: RobotSource) -> Iterator[str]:
             f"little inertia about {_some(light)}: without limits or the effects "
             "armature and acceleration_cost a least-torque motion may whirl there"
         )
+    yield from source.notes
     if source.urdf is None:
         return
     robot = checked_urdf(source.urdf, source.reference)

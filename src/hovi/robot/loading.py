@@ -183,9 +183,10 @@ def load_robot(
     if form == "sdf":
         raise ModelError(f"{str(x)!r} is SDF, which Pinocchio's wheel does not read: save a URDF.")
     if form == "mjcf":
-        model, shapes = model_of_mjcf(Path(x), bool(free_flyer))
-        given = (visual or shapes[0], collision or shapes[1])
-        return _from_model(model, model.name, held, given, semantics)
+        found_model = model_of_mjcf(Path(x), bool(free_flyer), held)
+        given = (visual or found_model.visual, collision or found_model.collision)
+        model = found_model.model
+        return _from_model(model, model.name, held, given, semantics, found_model.notes)
     if isinstance(x, Path) or is_path(x):
         source = file_source(Path(x), folders, held, bool(free_flyer), semantics, mimic)
     elif x in BUILT_IN_CODE:
@@ -220,6 +221,7 @@ def _from_model(
     locked: Locked,
     given: tuple[pin.GeometryModel | None, pin.GeometryModel | None],
     srdf: Path | None = None,
+    notes: tuple[str, ...] = (),
 ) -> Robot:
     if model.nv > MAX_DOF:
         raise ModelError(
@@ -232,5 +234,5 @@ def _from_model(
     queue = iter(shapes)
     kept = [None if shape is None else next(queue) for shape in given]
     text = None if srdf is None else read_srdf_file(srdf)
-    source = RobotSource(kind="model", reference=name, **_held(locked), srdf=text)
+    source = RobotSource(kind="model", reference=name, **_held(locked), srdf=text, notes=notes)
     return Robot(name, reduced, source, (kept[0], kept[1]))

@@ -36,6 +36,7 @@ class RobotSource:
     armature: reflected rotor inertia in [kg m^2] by joint, from an example's SRDF.
     srdf: the text of the SRDF, or None.
     mimic: whether joints with a <mimic> tag follow their leaders.
+    notes: what the file of a model says and the model does not have, for `hovi info`.
     Raises ModelError for such a folder.
     """
 
@@ -51,6 +52,7 @@ class RobotSource:
     armature: tuple[tuple[str, float], ...] = ()
     srdf: str | None = field(default=None, repr=False)
     mimic: bool = False
+    notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         for folder in self.package_dirs:

@@ -100,7 +100,7 @@ def test_a_missing_package_is_named(
         hovi.load_robot(robot)
 
 
-def test_mjcf_is_read_by_pinocchio(tmp_path: Path) -> None:
+def test_mjcf_comes_back(tmp_path: Path) -> None:
     """What hovi writes for MuJoCo has the same dynamics when it comes back."""
     scene = hovi.Scene(hovi.load_robot("ur5"), [hovi.effects.Gravity()])
     cubic_motion(scene)[0].to_mujoco(tmp_path / "arm.xml", 1.0)
@@ -119,7 +119,7 @@ def test_mjcf_is_read_by_pinocchio(tmp_path: Path) -> None:
 
 def test_what_pinocchio_does_not_read_is_told(tmp_path: Path) -> None:
     (tmp_path / "bad.xml").write_text("<mujoco><worldbody><body></mujoco>")
-    with pytest.raises(ModelError, match=r"Pinocchio does not read the MJCF 'bad\.xml'"):
+    with pytest.raises(ModelError, match=r"MJCF 'bad\.xml': it is not well-formed XML"):
         hovi.load_robot(tmp_path / "bad.xml")
     (tmp_path / "robot.sdf").write_text(SDF)
     with pytest.raises(ModelError, match="is SDF, which Pinocchio's wheel does not read"):

@@ -1,23 +1,42 @@
-"""Models from MJCF files, as Pinocchio reads them."""
+"""Models from MJCF files, read as MuJoCo reads them.
+
+Pinocchio's own reader takes the bodies of a second <worldbody> twice, leaves out bodies inside a
+<frame> or without a name, and ignores what it does not know, so that another robot is planned for.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 
 import pinocchio as pin
 
-from hovi.errors import ModelError
-from hovi.system.files import reason, require_file
+from hovi.errors import ModelError, warn
+from hovi.robot.formats.mjcf_assets import Meshes
+from hovi.robot.formats.mjcf_bodies import Bodies
+from hovi.robot.formats.mjcf_defaults import Defaults, compiler_of
+from hovi.robot.formats.mjcf_notes import loops, notes_of, require_known
+from hovi.robot.formats.mjcf_shapes import shapes_of
+from hovi.robot.formats.mjcf_text import MjcfError, read_mjcf
+from hovi.system.dataclass import dataclass
 
-MAX_BYTES = 2**26
-Geometry = tuple[pin.GeometryModel | None, pin.GeometryModel | None]
+
+@dataclass(frozen=True, eq=False)
+class MjcfModel:
+    """A model with its visual and collision shapes, or None, and notes on what is not read."""
+
+    model: pin.Model
+    visual: pin.GeometryModel | None
+    collision: pin.GeometryModel | None
+    notes: tuple[str, ...]
 
 
-def model_of_mjcf(path: Path, free_flyer: bool) -> tuple[pin.Model, Geometry]:
-    """The model, and its visual and collision geometry where Pinocchio finds the meshes.
+def model_of_mjcf(path: Path, free_flyer: bool, locked: Iterable[str] = ()) -> MjcfModel:
+    """The model of an MJCF file, and a warning about ties of joints that it does not keep.
 
     free_flyer: asked for; an MJCF has it by an element <freejoint/>.
-    Raises ModelError for a file that Pinocchio does not read.
+    locked: joints that will not move, whose ties need no warning.
+    Raises ModelError for a file that is no MJCF, or has what hovi does not read.
     """
     if free_flyer:
         raise ModelError(
@@ -25,26 +44,30 @@ def model_of_mjcf(path: Path, free_flyer: bool) -> tuple[pin.Model, Geometry]:
             f"{path.name!r}."
         )
     try:
-        require_file(path, MAX_BYTES)
-        model = pin.buildModelFromMJCF(str(path))
-    except OSError as error:
-        raise ModelError(f"cannot read the MJCF file {str(path)!r}: {reason(error)}.") from error
-    except Exception as error:  # Pinocchio's own, of several kinds
-        raise ModelError(
-            f"Pinocchio does not read the MJCF {path.name!r}: {_cause(error)}."
-        ) from error
-    model.name = model.name or path.stem
-    kinds = pin.GeometryType.VISUAL, pin.GeometryType.COLLISION
-    return model, (_geometry(model, path, kinds[0]), _geometry(model, path, kinds[1]))
+        return _model(path, frozenset(locked))
+    except MjcfError as error:
+        raise ModelError(f"MJCF {path.name!r}: {error}") from error
 
 
-def _geometry(model: pin.Model, path: Path, kind: pin.GeometryType) -> pin.GeometryModel | None:
-    try:
-        return pin.buildGeomFromMJCF(model, str(path), kind)
-    except Exception:  # such as a mesh that is not there
-        return None
-
-
-def _cause(error: Exception) -> str:
-    """What Pinocchio says, without the place in its sources."""
-    return " ".join(str(error).rpartition("message:")[2].split()).removesuffix(".")
+def _model(path: Path, locked: frozenset[str]) -> MjcfModel:
+    root = read_mjcf(path)
+    require_known(root)
+    compiler, defaults = compiler_of(root), Defaults(root)
+    bodies = Bodies(root, compiler, defaults, Meshes(root, path.parent, compiler, defaults))
+    if not bodies.bodies:
+        raise MjcfError("it has no <body> in <worldbody>: a robot needs at least one.")
+    bodies.model.name = root.get("model", "") or path.stem
+    notes = [*notes_of(root, defaults), *bodies.notes]
+    if bodies.world:
+        notes.append(
+            f"shapes of the world are no obstacles, give them by name: {len(bodies.world)}"
+        )
+    shapes = [shapes_of(bodies, kind) for kind in ("visual", "collision")]
+    notes += [problem for _, problem in shapes if problem]
+    if ties := loops(root, locked):
+        warn(
+            f"MJCF {path.name!r}: its joints move freely, without {', '.join(ties[:3])}"
+            f"{f' and {len(ties) - 3} more' if len(ties) > 3 else ''}: lock the joints that these "
+            "tie, or plan for a robot without them."
+        )
+    return MjcfModel(bodies.model, shapes[0][0], shapes[1][0], tuple(notes))
