@@ -37,6 +37,7 @@ HOSTILE = {
     "1e9 vertices.off": off(CUBE, CUBE_FACES).replace(b"8 6 0", b"1000000000 6 0"),
     "1e9 facets.stl": bytes(80) + (10**9).to_bytes(4, "little") + bytes(50),
     "fewer vertices.ply": ply_text(CUBE, CUBE_FACES).replace(POINT, b"", 1),
+    "one more vertex.ply": ply_text(CUBE, CUBE_FACES).replace(b"vertex 8", b"vertex 9"),
     "many corners.obj": obj(STAR, [list(range(len(STAR)))]),
     "not a number.obj": obj([[math.nan, 0.0, 0.0], *CUBE[1:]], CUBE_FACES),
     "another shape than the text.stl": b"solid a\nfacet\nendsolid a\n",

@@ -99,3 +99,12 @@ def test_every_joint_of_a_body_has_its_name_and_moves_within_limits(tmp_path: Pa
 </body>""",
     )
     assert robot.joint_names == ("j", "x", "turn")
+
+
+def test_a_body_that_is_fixed_to_the_world_needs_no_mass(tmp_path: Path) -> None:
+    (tmp_path / "open.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\n")
+    mesh = '<asset><mesh name="m" file="open.obj"/></asset>'
+    geom = '<geom type="mesh" mesh="m"/>'
+    assert loaded(tmp_path, top=mesh, world=f'<body name="base">{geom}</body>').nv == 1
+    with pytest.raises(ModelError, match="a mesh with a mass that is not nearly convex and closed"):
+        loaded(tmp_path, top=mesh, world=f'<body name="arm"><joint/>{geom}</body>')

@@ -121,7 +121,8 @@ class Bodies:
         if inertials:  # checked also where <compiler> takes the geoms instead
             where = f"<inertial> of body {body!r}"
             inertia = inertial_of(inertials[0].attrib, where, self.compiler)
-        if rule == "true" or (rule == "auto" and not inertials):
+        counts = place.joint or self.compiler.total > 0.0  # what is fixed to the world needs none
+        if counts and (rule == "true" or (rule == "auto" and not inertials)):
             inertia, back = pin.Inertia.Zero(), place.pose.inverse()
             low, high = self.compiler.groups
             for geom in geoms:

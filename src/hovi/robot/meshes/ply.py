@@ -218,21 +218,35 @@ def _columns(element: _Element, table: np.ndarray) -> Iterator[Column]:
 
 
 class _Text:
-    """Reads one element after the other of a text."""
+    """Reads one element after the other of a text, in which every row is a line."""
 
     def __init__(self, content: bytes) -> None:
-        self.numbers, self.at = floats(content), 0
+        self.lines = [line for line in content.splitlines() if line.strip()]
+        self.used = self.at = 0
+        self.numbers = np.empty(0)
 
     def rows(self, element: _Element) -> list[Column]:
         """The columns of an element, one for each property."""
+        lines = self.lines[self.used : self.used + element.count]
+        if len(lines) < element.count:
+            raise _too_short(element)
+        self.used += element.count
+        self.numbers, self.at = floats(b"\n".join(lines)), 0
+        columns = self._columns(element)
+        if self.at != len(self.numbers):
+            raise BrokenMeshError(
+                f"has lines of its element {element.name!r} with more numbers than it declares: "
+                "export it again."
+            )
+        return columns
+
+    def _columns(self, element: _Element) -> list[Column]:
         columns = [list[float]() for _ in element.properties]
         lengths = [list[int]() for _ in element.properties]
         if not any(each.counted for each in element.properties):
             width = len(element.properties)
             table = self._take(width * element.count, element).reshape(-1, max(width, 1))
             return [table[:, k] for k in range(width)]
-        if element.count > len(self.numbers) - self.at:
-            raise _too_short(element)
         if len(element.properties) == 1 and (lists := self._equal_lists(element.count)):
             return [lists]
         for _ in range(element.count):
@@ -276,9 +290,9 @@ class _Text:
 
     def require_end(self) -> None:
         """Raise BrokenMeshError if something follows."""
-        if self.at != len(self.numbers):
+        if self.used != len(self.lines):
             raise BrokenMeshError(
-                f"has {len(self.numbers) - self.at:,} numbers after its last element: export it "
+                f"has {len(self.lines) - self.used:,} lines after its last element: export it "
                 "again."
             )
 
