@@ -14,6 +14,7 @@ from hovi.planning.clearance.distances import Distances, distances_between
 from hovi.planning.obstacles.obstacle import Body, Obstacle
 from hovi.planning.obstacles.obstacle_path import ObstaclePath
 from hovi.planning.problem.limits import Limits
+from hovi.planning.problem.way_back.excused import excused_sentence
 from hovi.system.dataclass import dataclass
 
 _OBSTACLE_COLOR = np.array([0.75, 0.32, 0.22, 1.0])  # brick: stands out from robots and background
@@ -46,7 +47,14 @@ def _loosest(parts: list[Limits]) -> Limits:
     parts = list(Limits.of_segments(parts, range(1, len(parts))).parts)  # of the same size
     lower = np.min([each.lower for each in parts], axis=0)
     upper = np.max([each.upper for each in parts], axis=0)
-    return Limits(lower, upper, max(each.tolerance for each in parts))
+    excused = tuple(each for part in parts for each in part.excused)
+    return Limits(lower, upper, max(each.tolerance for each in parts), excused=excused)
+
+
+def led_back_sentence(trajectory: Trajectory) -> str:
+    """What a motion exceeds of its recorded limits from its start on; "" if nothing."""
+    limits = imposed_limits(trajectory)
+    return "" if limits is None else excused_sentence(limits.excused)
 
 
 def imposed_clearance(trajectory: Trajectory) -> Clearance | None:

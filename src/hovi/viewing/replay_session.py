@@ -28,7 +28,7 @@ from hovi.viewing.highlights import AT_LIMIT_NOTE, Highlights
 from hovi.viewing.meshcat_page import Page, packed
 from hovi.viewing.meshcat_server import ServedPage
 from hovi.viewing.panel.panel import Curves, Panel, View, joints_of, labels_of, names_of
-from hovi.viewing.recorded_limits import MovingObjects, imposed_limits
+from hovi.viewing.recorded_limits import MovingObjects, imposed_limits, led_back_sentence
 
 with warnings.catch_warnings():
     # meshcat imports a deprecated module of ZeroMQ that hovi does not use.
@@ -257,7 +257,8 @@ def _fill(
     warn_of_cautions(trajectory.metadata)
     others = [(each, _robot(each)) for each in compare]
     highlights = Highlights.of(trajectory, robot, frame_times(trajectory))
-    page.title, page.note = _title(trajectory, robot), _note(robot, highlights)
+    led_back = led_back_sentence(trajectory)
+    page.title, page.note = _title(trajectory, robot), _note(led_back, robot, highlights)
     page.cautions = caution_lines([each.metadata for each in (trajectory, *compare)])
     scene = drawn(trajectory, robot, page, trace, highlights, others)
     page.panel = _panel(trajectory, robot, compare, scene.view, speed, trace)
@@ -331,9 +332,10 @@ def _open_browser(page: ServedPage) -> None:
         raise DisplayError(f"no browser showed the page in {_BROWSER_TIMEOUT:.0f} s; {advice}")
 
 
-def _note(robot: Robot, highlights: Highlights | None) -> str:
+def _note(led_back: str, robot: Robot, highlights: Highlights | None) -> str:
     at_limit = "" if highlights is None else AT_LIMIT_NOTE
-    return " ".join(note for note in (robot.visual_problem, at_limit) if note)
+    notes = [led_back, robot.visual_problem, at_limit]
+    return " ".join(note for note in notes if note)
 
 
 def _title(trajectory: Trajectory, robot: Robot) -> str:

@@ -57,6 +57,10 @@ def as_json(
         "limit_set": limit_set_json(limit_set_of(task), trajectory.grid.order),
         "limits": None if limits is None else limits.by_kind(),
         "excess": None if limits is None else limits.excess,
+        "excused": [
+            {"limit": each.limit, "joint": each.joint, "excess": each.excess, "until": each.until}
+            for each in solution.excused
+        ],
         "usable": None if margins.violation is None else not margins.violation,
         "violation": margins.violation or None,
         "least_distance": margins.distance,
@@ -157,6 +161,8 @@ def _summary(
     ]
     if margins.violation is not None and not solution.success:
         rows.insert(2, ("usable", _usable(margins.violation)))
+    if solution.excused:
+        rows.append(("excused", "; ".join(map(str, solution.excused))))
     rows += segment_lines(solution, margins.segments)
     if len(solution.minima) > 1:
         costs = [f"{cost:.6g}" for cost in solution.minima]

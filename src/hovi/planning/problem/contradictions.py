@@ -3,23 +3,19 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
 from hovi.discrete.state import Periodic
 from hovi.planning.clearance.clearance_violation import less_than_margin
 from hovi.planning.problem.arms.limit_set import KIND_NAMES
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.goal_clearance import goal_in_obstacle
-from hovi.planning.problem.limits import KINDS, Limits
+from hovi.planning.problem.limits import Limits
 from hovi.planning.problem.node_conditions import JointCondition
 from hovi.planning.problem.presolve.end_torques import unavoidable_torque
 from hovi.planning.problem.presolve.legs import Stop, states_too_far_apart
 from hovi.planning.problem.problem import TrajectoryProblem
-from hovi.robot.space.angle_ranges import beyond_in_degrees
-from hovi.robot.space.coordinates import Coordinates
-
-Array = npt.NDArray[np.float64]
-Mask = npt.NDArray[np.bool_]
+from hovi.planning.problem.way_back.end_state import EndState
+from hovi.planning.problem.way_back.led_back import refused
 
 MARGIN_TOLERANCE = 1e-9
 """Distance by which an end may violate the margin, in [m]."""
@@ -30,60 +26,38 @@ def contradiction(problem: TrajectoryProblem, limits: Limits) -> str:
 
     Checks the ends, the via points, and the mean velocities that the duration requires.
     """
-    q0, v0, q1, v1 = problem.boundary
-    space = problem.coordinates.space
-    q0, q1 = space.coordinates(q0), space.coordinates(q1)
     if problem.unreachable:
         return problem.unreachable
-    accelerations = problem.end_jets[2:3] if problem.ld.k > 2 else ()
-    for i, (end, state) in enumerate((("start", (q0, v0)), ("goal", (q1, v1)))):
-        for row, values in enumerate((*state, *(a[i] for a in accelerations))):
-            held = ~problem.free_ends[i, row]
-            here = limits.at_ends[i]
-            sentence = _outside(problem.coordinates, end, row, values, here, held)
-            if sentence:
-                return sentence
     return (
-        _via_outside(problem, limits)
+        _goal_leaves(problem)
+        or _via_leaves(problem, limits)
         or _end_in_obstacle(problem)
         or _duration_too_short(problem, limits)
         or unavoidable_torque(problem, limits)
     )
 
 
-def _outside(
-    coordinates: Coordinates, end: str, row: int, values: Array, limits: Limits, held: Mask
-) -> str:
-    """Which prescribed component of an end's q or v is outside its limits; "" if none is."""
-    outside = np.maximum(limits.lower[row] - values, values - limits.upper[row])
-    outside = np.where(held, outside / limits.ranges[row], -np.inf)
-    i = int(np.argmax(outside))
-    if outside[i] <= limits.tolerance:
+def _goal_leaves(problem: TrajectoryProblem) -> str:
+    """What of the goal is outside its limits, or leads or came from outside; "" if nothing."""
+    limits = problem.limits
+    if limits is None or not limits.bounded.any() or problem.periodic:
         return ""
-    name, unit = coordinates.coordinate_names[i], coordinates.coordinate_units[i][row]
-    lower, upper = limits.lower[row, i], limits.upper[row, i]
-    slip = beyond_in_degrees(values[i], lower, upper) if row == 0 and unit == "rad" else ""
-    return (
-        f"the {KIND_NAMES[KINDS[row]]} of joint {name!r} at the {end} is {values[i]:.6g} {unit}, "
-        f"outside its limits [{lower:.6g}, {upper:.6g}]"
-        + (f", {slip}" if slip else f"; change the {end} or widen the limits")
-    )
+    return refused(problem.end_state(1), "goal")
 
 
-def _via_outside(problem: TrajectoryProblem, limits: Limits) -> str:
-    """Which via point is outside the limits; "" if none is."""
-    space, t = problem.coordinates.space, problem.grid.t
+def _via_leaves(problem: TrajectoryProblem, limits: Limits) -> str:
+    """Which via point is outside the limits, or leads or came from outside; "" if none does."""
+    on, T = problem.coordinates, problem.grid.duration
+    scene = problem.scene if problem.about_robot else None
     for each in problem.conditions:
-        via = each.condition
-        if not isinstance(via, JointCondition):
+        via, t = each.condition, float(problem.grid.t[each.node])
+        if not isinstance(via, JointCondition) or limits.parts:  # of both where segments meet
             continue
-        end = f"via point at {t[each.node]:g} s"
-        if limits.parts:  # of both segments where it is at their shared node
-            continue
-        for row, values in enumerate((space.coordinates(via.target), via.velocity)):
-            sentence = _outside(problem.coordinates, end, row, values, limits, via.held[row])
-            if sentence:
-                return sentence
+        jet, window = (via.target, via.velocity), limits.window * T
+        state = EndState.of(on, limits, jet, via.held, T, window, scene, t)
+        sentence = refused(state, f"via point at {t:g} s", passed=True)
+        if sentence:
+            return sentence
     return ""
 
 

@@ -150,6 +150,8 @@ class _Side:
         raise_if_late()
         bound = self.bound[np.minimum(intervals, len(self.bound) - 1)]
         excess = self.sign * (outputs - bound[:, None]) / self.limits.ranges
+        if self.limits.excused:
+            excess -= self.wider(intervals[:, None], POSITIONS) / self.limits.ranges
         index = np.argmax(excess, axis=1)
         largest = np.take_along_axis(excess, index[:, None], axis=1)[:, 0]
         s = POSITIONS[index]
@@ -168,6 +170,11 @@ class _Side:
             if found[row] >= largest[entry]:
                 largest[entry], s[entry] = found[row], at[row]
         return largest, s
+
+    def wider(self, k: Index, s: Array) -> Array:
+        """By how much bounds are wider at positions s in intervals k, (*s.shape, kinds, nv)."""
+        t = self.trajectory.t[k] + s * self.trajectory.grid.steps[k]
+        return self.limits.wider(int(self.sign), t)
 
     def refined(self, *extremes: Index) -> tuple[Array, Array]:
         """As `_refined_batch`, in batches, since a deadline may be in force."""
@@ -197,6 +204,8 @@ class _Side:
             shape = len(k), REFINED_SAMPLES, *self.bound.shape[1:]
             values = outputs.reshape(shape)[rows, :, kind, joint]
             excess = self.sign * (values - bound[:, None])
+            if self.limits.excused:
+                excess -= self.wider(k[:, None], around)[rows, :, kind, joint]
             excess /= self.limits.ranges[kind, joint][:, None]
             best = np.argmax(excess, axis=1)
             at = around[rows, best]
@@ -260,6 +269,7 @@ def worst_sentence(trajectory: Trajectory, limits: Limits, coordinates: Coordina
     value = _outputs(trajectory, np.array([k]), np.array([s]), limits)[0, kind, joint]
     bound = bounds[min(int(k), len(bounds) - 1), kind, joint]
     t = trajectory.t[k] + s * trajectory.grid.steps[k]
+    bound += bounded.sign * limits.wider(int(bounded.sign), np.array(t))[kind, joint]
     unit = coordinates.coordinate_units[joint][kind]
     return (
         f"the {KIND_NAMES[KINDS[kind]]} of joint {coordinates.coordinate_names[joint]!r} reaches "

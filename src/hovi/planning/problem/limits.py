@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import Any
@@ -10,12 +11,14 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.checks.arguments import check_arguments, check_arguments_except
-from hovi.checks.kinds import is_number, shown
-from hovi.checks.shapes import numbers_of, require_shape
+from hovi.checks.kinds import shown
+from hovi.checks.shapes import require_shape
 from hovi.errors import InputError, nearest, warn
 from hovi.planning.problem.arms.limit_set import KIND_NAMES, OF_ORDER_3, is_limit_set, limit_set
 from hovi.planning.problem.arms.limit_set import NAMES as ARMS
+from hovi.planning.problem.notation.limit_entries import entries, number_in
 from hovi.planning.problem.notation.summaries import LimitsSummary
+from hovi.planning.problem.way_back.excused import Excused, widening
 from hovi.robot.robot import Robot
 from hovi.robot.space.angle_ranges import ranges_in_degrees, speeds_in_degrees
 from hovi.robot.space.coordinates import Coordinates
@@ -34,6 +37,8 @@ MIN_RANGE = 1e-12
 """Minimum range upper - lower, relative to the bounds where they are larger than one."""
 TOLERANCE = 1e-6
 """Share of its range by which a limit may be exceeded between the quadrature points."""
+WINDOW = 0.05
+"""Share of a motion in which a start outside its limits is led back, if it can be so slowly."""
 
 
 @check_arguments
@@ -46,6 +51,9 @@ class Limits(LimitsSummary):
         Limits on the jerk and on d tau / dt need a Lagrangian of order 3.
     tolerance: share of its range by which a limit may be exceeded anywhere.
     parts, ends: of a motion in segments, see `of_segments`.
+    strict: whether a start outside its limits, or that cannot but leave them, is refused.
+    window: least share of the motion in which it is led back otherwise.
+    excused: of a motion, what its start exceeds until when; `TrajectoryProblem` sets it.
     Raises InputError for NaN and for a range that is empty to rounding.
     """
 
@@ -54,6 +62,9 @@ class Limits(LimitsSummary):
     tolerance: float = TOLERANCE
     parts: tuple[Limits, ...] = ()
     ends: tuple[float, ...] = ()
+    strict: bool = False
+    window: float = WINDOW
+    excused: tuple[Excused, ...] = ()
 
     def __post_init__(self) -> None:
         few = self.lower.shape[:1] == (FIRST_KINDS,)
@@ -93,8 +104,8 @@ class Limits(LimitsSummary):
         high = np.max(np.where(np.isfinite(upper), upper, -np.inf), axis=0)
         high[np.isinf(high)] = np.inf
         low[np.isinf(low) | (low >= high)] = -np.inf  # one-sided bounds of different segments
-        tolerance = min(each.tolerance for each in parts)
-        return cls(low, high, tolerance, tuple(parts), tuple(ends))
+        tolerance, strict = min(each.tolerance for each in parts), any(x.strict for x in parts)
+        return cls(low, high, tolerance, tuple(parts), tuple(ends), strict, parts[0].window)
 
     def on(self, nodes: Array) -> Range:
         """Lower and upper bounds in each interval, (N or 1, kinds, nv): 1 without segments.
@@ -108,6 +119,21 @@ class Limits(LimitsSummary):
         part = np.searchsorted(np.array(self.ends), middle)
         lower, upper = (np.stack([getattr(p, x) for p in self.parts]) for x in ("lower", "upper"))
         return lower[part], upper[part]
+
+    @property
+    def with_excused_parts(self) -> Limits:
+        """The same, whose first part knows what is excused of the start as well."""
+        if not (self.parts and self.excused):
+            return self
+        first = dataclasses.replace(self.parts[0], excused=self.excused)
+        return dataclasses.replace(self, parts=(first, *self.parts[1:]))
+
+    def wider(self, side: int, t: Array) -> Array:
+        """By how much bounds are wider at times, (*t.shape, kinds, nv), for what is excused.
+
+        side: 1 for upper bounds, -1 for lower ones. t: of any shape, in [s].
+        """
+        return widening(self.excused, side, t, self.lower.shape)
 
     @property
     def at_ends(self) -> tuple[Limits, Limits]:
@@ -152,7 +178,11 @@ class Limits(LimitsSummary):
     @property
     def first_kinds(self) -> Limits:
         """The limits on q, v, a and tau alone."""
-        return Limits(self.lower[:FIRST_KINDS], self.upper[:FIRST_KINDS], self.tolerance)
+        return self._between(self.lower[:FIRST_KINDS], self.upper[:FIRST_KINDS])
+
+    def _between(self, lower: Array, upper: Array) -> Limits:
+        """The same between other bounds."""
+        return dataclasses.replace(self, lower=lower, upper=upper)
 
     @property
     def bounded(self) -> npt.NDArray[np.bool_]:
@@ -175,7 +205,8 @@ class Limits(LimitsSummary):
             name: [[float(x) if np.isfinite(x) else None for x in row] for row in bound]
             for name, bound in (("lower", self.lower), ("upper", self.upper))
         }
-        return {**rows, "tolerance": self.tolerance}
+        excused = [each.to_dict() for each in self.excused]
+        return {**rows, "tolerance": self.tolerance, **({"excused": excused} if excused else {})}
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Limits:
@@ -185,8 +216,9 @@ class Limits(LimitsSummary):
                 np.array([[free if x is None else x for x in row] for row in data[name]], float)
                 for name, free in (("lower", -np.inf), ("upper", np.inf))
             )
-            return cls(lower, upper, float(data["tolerance"]))
-        except (KeyError, TypeError, ValueError, OverflowError) as error:
+            known = tuple(Excused.from_dict(x, lower.shape[1]) for x in data.get("excused", ()))
+            return cls(lower, upper, float(data["tolerance"]), excused=known)
+        except (KeyError, TypeError, ValueError, OverflowError, IndexError) as error:
             raise InputError(
                 f"expected the limits that `to_dict` returns, got data with {error!r}."
             ) from error
@@ -198,7 +230,7 @@ class Limits(LimitsSummary):
         rows = [row for row, kind in enumerate(self.kinds) if kind in kinds]
         lower, upper = self.lower.copy(), self.upper.copy()
         lower[rows], upper[rows] = -np.inf, np.inf
-        return Limits(lower, upper, self.tolerance)
+        return self._between(lower, upper)
 
     def excess(self, outputs: Array) -> Array:
         """Distance of each output outside its range, as a share of the range; negative inside.
@@ -220,7 +252,7 @@ class Limits(LimitsSummary):
         shift = margin * self.ranges
         if self.parts:
             return Limits.of_segments([p.with_margin(margin) for p in self.parts], self.ends)
-        return Limits(self.lower + shift, self.upper - shift, self.tolerance)
+        return self._between(self.lower + shift, self.upper - shift)
 
 
 def limited_columns(order: int, nv: int) -> npt.NDArray[np.intp]:
@@ -286,11 +318,11 @@ def as_limits(
         base = _with_all_kinds(base)
     lower, upper = base.lower.copy(), base.upper.copy()
     for row, kind in enumerate(KINDS):
-        for i, (low, high) in _entries(coordinates, kind, limits.get(kind, {})).items():
+        for i, (low, high) in entries(coordinates, kind, limits.get(kind, {})).items():
             lower[row, i], upper[row, i] = low, high
     lower[lower < -UNBOUNDED], upper[upper > UNBOUNDED] = -np.inf, np.inf
-    chosen = Limits(lower, upper, _number(limits, "tolerance", TOLERANCE))
-    return _warned_of_degrees(coordinates, chosen.with_margin(_number(limits, "margin", 0.0)))
+    chosen = Limits(lower, upper, number_in(limits, "tolerance", TOLERANCE))
+    return _warned_of_degrees(coordinates, chosen.with_margin(number_in(limits, "margin", 0.0)))
 
 
 def _warned_of_degrees(coordinates: Coordinates, limits: Limits) -> Limits:
@@ -306,13 +338,6 @@ def _warned_of_degrees(coordinates: Coordinates, limits: Limits) -> Limits:
         if suspicion:
             warn(f"{suspicion}; limits are in radians.")
     return limits
-
-
-def _number(limits: Mapping[str, Any], key: str, default: float) -> float:
-    value = limits.get(key, default)
-    if not is_number(value):
-        raise InputError(f"limits.{key} must be a number, got {value!r}.")
-    return float(value)
 
 
 def _by_name(coordinates: Coordinates, name: Any, order: int) -> Limits:
@@ -350,51 +375,3 @@ def _with_all_kinds(limits: Limits) -> Limits:
     more = np.full((len(KINDS) - len(limits.kinds), limits.lower.shape[1]), np.inf)
     lower, upper = np.concatenate([limits.lower, -more]), np.concatenate([limits.upper, more])
     return Limits(lower, upper, limits.tolerance)
-
-
-def _entries(coordinates: Coordinates, kind: str, given: Any) -> dict[int, tuple[float, float]]:
-    """Bounds by index in v, from any of the accepted forms."""
-    found = _pairs(coordinates, kind, given)
-    if kind == "q" and not coordinates.vector_joints:
-        for i in found:
-            if i not in coordinates.space.plain[1] and isinstance(given, Mapping):
-                raise InputError(
-                    f"limits.q: {coordinates.coordinate_names[i]!r} has no position limits, as the "
-                    "joint is continuous or floating; leave it out."
-                )
-        found = {i: pair for i, pair in found.items() if i in coordinates.space.plain[1]}
-    return found
-
-
-def _pairs(coordinates: Coordinates, kind: str, given: Any) -> dict[int, tuple[float, float]]:
-    names = coordinates.coordinate_names
-    if isinstance(given, Mapping):
-        for name in given:
-            if name not in names:
-                raise InputError(
-                    f"limits.{kind}: {coordinates.owner} has no joint {name!r}: "
-                    f"{coordinates.hint(str(name), names)}"
-                )
-        return {names.index(name): _pair(kind, name, value) for name, value in given.items()}
-    if is_number(given):
-        given = [given] * coordinates.nv
-    if not isinstance(given, Sequence | np.ndarray) or len(given) != coordinates.nv:
-        raise InputError(
-            f"limits.{kind} must have one entry for each of {', '.join(names)}, got {given!r}."
-        )
-    return {i: _pair(kind, names[i], value) for i, value in enumerate(given)}
-
-
-def _pair(kind: str, name: str, value: Any) -> tuple[float, float]:
-    try:
-        numbers = numbers_of(name, value)
-    except InputError:
-        numbers = np.full(3, np.nan)
-    if numbers.ndim == 0 and numbers > 0:
-        return -float(numbers), float(numbers)
-    if numbers.shape == (2,) and numbers[0] < numbers[1]:
-        return float(numbers[0]), float(numbers[1])
-    raise InputError(
-        f"limits.{kind} of {name!r} must be a positive number or a pair lower < upper, got "
-        f"{value!r}."
-    )

@@ -31,8 +31,11 @@ from hovi.planning.problem.hessian_structure import ActionStructure
 from hovi.planning.problem.limits import Limits, no_limits
 from hovi.planning.problem.node_conditions import NodeCondition
 from hovi.planning.problem.notation.summaries import ProblemSummary
+from hovi.planning.problem.notation.supported import require_supported
 from hovi.planning.problem.seams import Hold, ViaPoints, curve_through, holding
 from hovi.planning.problem.torque_moments import TorqueMoments
+from hovi.planning.problem.way_back.end_state import EndState
+from hovi.planning.problem.way_back.led_back import led_back
 from hovi.robot.mass_matrix import MassMatrix
 from hovi.robot.robot import Robot
 from hovi.robot.space.coordinates import Coordinates
@@ -45,9 +48,6 @@ from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
-
-LIMITED_ORDERS = 2, 3
-"""Orders of the Lagrangians whose problems may have limits, obstacles, via points and frames."""
 
 
 @check_arguments
@@ -91,7 +91,9 @@ class TrajectoryProblem(ProblemSummary):
     def __post_init__(self) -> None:
         for scheme, _ in self.grid.groups:
             require_regular(scheme)
-        _require_supported(self)
+        if self.periodic and (self.via or len(self.passive) > 0):
+            raise InputError("periodic motions have no via points or passive joints: omit them.")
+        require_supported(self, self.ld.k)
         of, limits = self.ld.lagrangian, self.limits
         if limits is not None and limits.on_torque_rate and isinstance(of, JerkLagrangian):
             object.__setattr__(self, "ld", DiscreteLagrangian(of.with_torque_rates(), self.grid))
@@ -122,10 +124,25 @@ class TrajectoryProblem(ProblemSummary):
             unreachable = unreachable or free_fall_contradiction(*known, self.grid.duration)
             independent = without_redundancy(self.scene, self.boundary[3], self.free_ends)
             object.__setattr__(self, "free_ends", independent)
+        if limits is not None and limits.bounded.any() and not self.periodic:
+            excused, refused = led_back(self.end_state(0), limits.strict)
+            unreachable = unreachable or refused
+            if excused != limits.excused:
+                object.__setattr__(self, "limits", dataclasses.replace(limits, excused=excused))
         object.__setattr__(self, "unreachable", unreachable)
         if self.clearance is not None:  # raises for missing collision shapes
             ends = self.boundary, self.free_ends, self.grid.duration
             object.__setattr__(self, "clearance", with_gaps(self.robot, self.clearance, *ends))
+
+    def end_state(self, end: int) -> EndState:
+        """The start, 0, or the goal, 1, with its limits."""
+        assert self.limits is not None
+        jet = [x[end] for x in self.end_jets] or list(self.boundary[2 * end :][:2])
+        T, ends, limits = self.grid.duration, self.limits.ends, self.limits.at_ends[end]
+        span = (ends[0] if end == 0 else T - ends[-1]) if ends else T
+        scene = self.scenes[-end] if self.about_robot else None
+        known = self.coordinates, limits, jet, ~self.free_ends[end], span, self.limits.window * span
+        return EndState.of(*known, scene, end * T)
 
     def _set_ends(self, start: State, goal: State, at_start: tuple[Array, Array]) -> None:
         """Set what both ends prescribe and leave free. at_start: q and v there."""
@@ -134,6 +151,7 @@ class TrajectoryProblem(ProblemSummary):
         free = [state.free_on(coordinates, name, k) for state, name in named]
         for state, name in named:
             state.require_order(k, name)
+        object.__setattr__(self, "end_jets", ())
         if k != 2:
             jets = [state.jet_on(coordinates, name)[:k] for state, name in named]
             object.__setattr__(self, "end_jets", tuple(map(np.stack, zip(*jets, strict=True))))
@@ -375,24 +393,3 @@ class TrajectoryProblem(ProblemSummary):
     def coordinates(self) -> Coordinates:
         """The robot, or the coordinates of a Lagrangian that is about none."""
         return self.scene.robot if self.about_robot else self.ld.lagrangian.coordinates
-
-
-def _require_supported(problem: TrajectoryProblem) -> None:
-    """Raise InputError for what this order, or a periodic motion, does not support."""
-    k, limits = problem.ld.k, problem.limits
-    if problem.periodic and (problem.via or len(problem.passive) > 0):
-        raise InputError("periodic motions have no via points or passive joints: leave them out.")
-    wanted = {
-        "limits": limits is not None and bool(limits.bounded.any()),
-        "obstacles": problem.clearance is not None and problem.clearance.wanted,
-        "via points": bool(problem.via),
-        "goals of frames": isinstance(problem.goal, FrameGoal),
-    }
-    named = [what for what, is_wanted in wanted.items() if is_wanted]
-    if k not in LIMITED_ORDERS and named:
-        raise InputError(
-            f"{' and '.join(named)} need a Lagrangian of order 2 or 3, and this one is of order "
-            f"{k}: leave them out."
-        )
-    if limits is not None:
-        limits.require_order(k)

@@ -31,7 +31,8 @@ from hovi.planning.problem.inverse_kinematics import (
 from hovi.planning.problem.kinematics.cubic_costs import cubic_costs
 from hovi.planning.problem.kinematics.full_turns import with_full_turns
 from hovi.planning.problem.limits import as_limits
-from hovi.planning.problem.problem import LIMITED_ORDERS, TrajectoryProblem
+from hovi.planning.problem.notation.supported import LIMITED_ORDERS
+from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.search.job import Job
 from hovi.planning.search.options import PlanOptions
 from hovi.planning.solver.solver import Solution, solve_on_grid

@@ -256,6 +256,13 @@ def with_more_points(job: Job) -> Job:
 
 def on_grid_of(problem: TrajectoryProblem, solution: Solution) -> TrajectoryProblem:
     """The problem on the solution's grid, whose intervals may have been split for limits."""
-    grid = solution.trajectory.grid
+    grid, known = solution.trajectory.grid, solution.problem
+    if known is not None and _window(known) > _window(problem):  # none was found within the other
+        return known
     same = np.array_equal(grid.steps, problem.grid.steps)
     return problem if same else problem.on(grid)
+
+
+def _window(problem: TrajectoryProblem) -> float:
+    """Share of the motion in which a start outside its limits is led back; 0 without limits."""
+    return 0.0 if problem.limits is None else problem.limits.window

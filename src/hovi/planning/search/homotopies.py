@@ -145,7 +145,7 @@ def _widened(limits: Limits, share: float) -> Limits:
     if limits.parts:
         return Limits.of_segments([_widened(p, share) for p in limits.parts], limits.ends)
     more = (share - 1) / 2 * limits.ranges
-    return Limits(limits.lower - more, limits.upper + more, limits.tolerance)
+    return dataclasses.replace(limits, lower=limits.lower - more, upper=limits.upper + more)
 
 
 def _with_duration(job: Job, share: float) -> Job:

@@ -80,10 +80,11 @@ class Job:
     options: PlanOptions = field(default_factory=PlanOptions)
     parts: tuple[Part, ...] = ()
 
-    @property
+    @cached_property
     def limits(self) -> Limits:
         """Bounds along the motion."""
-        return as_limits(self.scene.robot, self.options.limits)
+        limits = as_limits(self.scene.robot, self.options.limits)
+        return dataclasses.replace(limits, strict=True) if self.options.strict else limits
 
     @property
     def via(self) -> tuple[Via, ...]:

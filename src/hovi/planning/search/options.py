@@ -104,6 +104,12 @@ class PlanOptions:
         'bounds on q, v, a and tau along the whole motion: "urdf" (those of the URDF), "none", the '
         "name of an arm of hovi.limit_sets, a Limits, or a mapping as for as_limits.",
     )
+    strict: bool = option(
+        False,
+        "whether a start outside its limits, or that cannot but leave them, is refused; otherwise "
+        "it is led back from up to 2 % beyond, which the solution's `excused` tells.",
+        SceneKey("true or false"),
+    )
     starts: int = whole_number(
         1,
         "number of solves from seeded random perturbations; the best minima found are refined on "

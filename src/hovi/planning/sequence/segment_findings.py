@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
@@ -28,7 +29,8 @@ def segment_findings(
         number = leg.numbers[0]
         if before is None:
             break
-        problem = _alone(job, leg, before, limits[number])
+        bounds = limits[number] if number == 0 else dataclasses.replace(limits[number], strict=True)
+        problem = _alone(job, leg, before, bounds)
         looked_like += slips(problem)
         if len(leg.numbers) == 1:
             found = about_limits(problem, before, leg.goal)

@@ -375,6 +375,8 @@ class BoundedAction(BoundedObjective[DiscretePath]):
             upper = np.pad(upper, ((0, 0), (0, size)), constant_values=np.inf)
         if len(lower) > 1:  # they differ between segments
             lower, upper = lower[intervals], upper[intervals]
+        if self.limits.excused:
+            lower, upper = lower - self._wider(-1, size), upper + self._wider(1, size)
         shape = (len(intervals), lower.shape[1])
         lower, upper, weights = (np.broadcast_to(x, shape) for x in (lower, upper, weights))
         if margins is None or not margins.any():
@@ -384,6 +386,12 @@ class BoundedAction(BoundedObjective[DiscretePath]):
         chosen = np.append(self._bounded, np.arange(first, first + size))
         tightening = tightening[:, :, chosen][:, intervals]
         return lower + tightening[0], upper - tightening[1], weights
+
+    def _wider(self, side: int, more: int) -> Array:
+        """By how much bounds of a side are wider at the points, (P, K). more: further outputs."""
+        wider = self.limits.wider(side, np.concatenate(self.ld.point_times))
+        chosen = wider.reshape(len(wider), -1)[:, self._bounded] * self._inverse_ranges
+        return np.pad(chosen, ((0, 0), (0, more)))
 
     def _rows_of(self, bound: Array) -> Array:
         """Bounds (N or 1, kinds, nv) in scaled outputs, shape (N or 1, K)."""

@@ -12,6 +12,7 @@ from hovi.discrete.grid import DiscretePath, Grid
 from hovi.discrete.guess import stretched
 from hovi.optimize.barrier import Barrier
 from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.solver.limits.graded_parts import GivenEnds
 from hovi.planning.solver.limits.limit_rows import LimitRows
 from hovi.planning.solver.near.clearance_rows import ClearanceRows
 from hovi.robot.space.coordinates import Coordinates
@@ -107,14 +108,30 @@ class CentralPath:
         )
         return CentralPath(points, None, conditions=self.conditions)
 
-    def between(self, free_ends: Mask) -> CentralPath:
-        """The same, without rows and multipliers if ends are free that were not, or the reverse.
+    def from_ends_of(self, problem: TrajectoryProblem) -> CentralPath:
+        """The same for the ends of a problem and what its start exceeds; new rows have no forces.
 
-        free_ends: see LimitRows.
+        Without rows and multipliers if ends are free that were not, or the reverse.
         """
-        if self.rows is None or np.array_equal(self.rows.free_ends, free_ends):
+        if self.rows is None:
             return self
-        return CentralPath(self.points, None)
+        if not np.array_equal(self.rows.free_ends, problem.free_ends):
+            return CentralPath(self.points, None)
+        if problem.limits is None:
+            return self
+        rows, kept = self.rows.between(problem.limits, GivenEnds.of(problem))
+        if rows is self.rows:
+            return self
+        barrier = self.barrier
+        if barrier is not None:
+            first = len(barrier.s) - self.rows.size
+            index = np.concatenate([np.arange(first), np.where(kept < 0, -1, first + kept)])
+            barrier = barrier.of(index)
+            s = np.append(
+                barrier.s[:first], np.where(kept < 0, rows.values(self.last), barrier.s[first:])
+            )
+            barrier = dataclasses.replace(barrier, s=s)
+        return dataclasses.replace(self, rows=rows, barrier=barrier)
 
     def freed(self) -> CentralPath:
         """The same with rows that may be refined."""

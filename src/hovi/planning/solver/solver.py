@@ -28,6 +28,7 @@ from hovi.planning.problem.tolerance import LAST_BARRIER, REMAINING_SHARE, Accur
 from hovi.planning.problem.units import as_time_limit, seconds
 from hovi.planning.solver.initial_path import guess_path
 from hovi.planning.solver.limits.row_forces import at_instants
+from hovi.planning.solver.longer_way_back import minimized
 from hovi.planning.solver.methods.choice import method_for, method_from
 from hovi.planning.solver.methods.method import Method, MethodResult, Report
 from hovi.planning.solver.methods.result_motion import motion_of
@@ -35,6 +36,7 @@ from hovi.planning.solver.methods.stationary import Stationary
 from hovi.planning.solver.outcome.cost_with_time import cost_of
 from hovi.planning.solver.outcome.judge import judged
 from hovi.planning.solver.outcome.solution_summary import SolutionSummary
+from hovi.planning.solver.receding.braking import BRAKES, braking
 from hovi.planning.solver.receding.ends import (
     as_goal,
     as_start,
@@ -43,8 +45,9 @@ from hovi.planning.solver.receding.ends import (
     is_near,
     measured,
     require_known,
+    with_strictness,
 )
-from hovi.planning.solver.receding.last_motion import last_motion, meets
+from hovi.planning.solver.receding.last_motion import last_motion, meets, starts_there
 from hovi.planning.solver.status import Status, unfinished
 from hovi.planning.solver.warm_start import follow
 from hovi.scene.lagrangian import PointTerms
@@ -131,6 +134,7 @@ class Solution(SolutionSummary):
         goal: End | Periodic | None = None,
         guess: Solution | None = None,
         time_limit: float | str | None = None,
+        strict: bool | None = None,
         **options: Any,
     ) -> Solution:
         """The motion between other states, with this motion or another as the initial guess.
@@ -144,14 +148,16 @@ class Solution(SolutionSummary):
             is the step of the solver that has begun and the end of the call. The status is then
             TIME_LIMIT, and the motion the best one that meets the ends, the limits and the
             equations to 1e-6; if there is none, this motion as it is, and the message says what it
-            misses.
+            misses. From a start that it misses, a braking motion to rest within the limits instead,
+            where one is found: its goal is where it stops.
+        strict: whether a start outside its limits is refused; as planned if None.
         options: as for `solve`. Self-collision that was left out is not looked for, as `plan` does.
         Raises InputError if this solution has no problem, UnreachableError for a start at a frame
         that no configuration meets.
         """
         deadline = Deadline(as_time_limit(time_limit))
         require_known(options, Solution.replan, solve_on_grid)
-        old = self._solved_problem
+        old = with_strictness(self._solved_problem, strict)
         problem = old.between(
             old.start if start is None else as_start(start, old),
             old.goal if goal is None else as_goal(goal, old),
@@ -171,6 +177,7 @@ class Solution(SolutionSummary):
         *,
         duration: float | str | None = None,
         time_limit: float | str | None = None,
+        strict: bool | None = None,
         **options: Any,
     ) -> Solution:
         """The motion from a time on, from the state that was measured then: a receding horizon.
@@ -180,14 +187,15 @@ class Solution(SolutionSummary):
         nodes, and is as accurate as it was. Limits between the points, the barrier and multipliers
         follow, so that a small disturbance takes a few steps.
         elapsed: time since the start of this motion, in [s], or a text such as "20 ms".
-        start: the state at that time, as for `replan`, which must be within the limits; the
-            motion's own one if None. The acceleration of a smooth motion is the motion's own one if
-            none is given.
+        start: the state at that time, as for `replan`; the motion's own one if None. One that is
+            measured outside its limits is led back: see `excused`. The acceleration of a smooth
+            motion is the motion's own one if none is given.
         goal: as for `replan`.
         duration: of the new motion, in [s] or as a text; what is left of this one if None. With
             another one, as for a horizon that moves, the rest is stretched and sampled again on as
             many intervals.
         time_limit: as for `replan`; what comes back is this motion from that time on.
+        strict: as for `replan`.
         options: as for `solve`.
         Via points that have passed are left out.
         Raises InputError if this solution has no problem, if it ends before the time, or if it is
@@ -197,7 +205,7 @@ class Solution(SolutionSummary):
 
         deadline = Deadline(as_time_limit(time_limit))
         require_known(options, Solution.advance, solve_on_grid)
-        old = self._solved_problem
+        old = with_strictness(self._solved_problem, strict)
         length = None if duration is None else seconds(duration, "the duration")
         shift = Shift.of(old, seconds(elapsed, "the time elapsed"), length)
         path = shift.path(self.trajectory.path)
@@ -253,13 +261,31 @@ class _Again:
                 raise_if_late()
                 found = self._solved(deadline.part(SOLVE_SHARE).seconds_left, options)
                 if found.status is not Status.TIME_LIMIT:
-                    return judged(found) if self.check is None else self.check(found)
+                    done = judged(found) if self.check is None else self.check(found)
+                    return done if done.success else self._at_rest(done) or done
                 if np.isfinite(found.cost) and self._meets(found):
                     return self._kept(found)
+                if stopped := self._at_rest(found):
+                    return stopped
             except OutOfTimeError:
                 found = None
         steps = 0 if found is None else found.nit
         result = last_motion(self.problem, self.path, self.central, steps, last)
+        return dataclasses.replace(solution_of(result, 0.0, 0.0), check=self.check)
+
+    def _at_rest(self, found: Solution) -> Solution | None:
+        """A braking motion, where neither the one found nor the last one can be executed."""
+        problem = self.problem
+        if not problem.limited or starts_there(problem, self.path) or found.usable:
+            return None
+        stopped = braking(problem)
+        if stopped is None:
+            return None
+        message = f"{found.message} {BRAKES}"
+        cost, status = problem.ld.action(stopped.path), found.status
+        result = MethodResult(
+            stopped.problem, stopped.path, cost, status, message, found.nit, central=self.central
+        )
         return dataclasses.replace(solution_of(result, 0.0, 0.0), check=self.check)
 
     def _meets(self, found: Solution) -> bool:
@@ -331,7 +357,7 @@ def solve_on_grid(
     started = time.perf_counter()
     try:
         with Deadline(time_limit).in_force():
-            result = method.minimize(problem, path, options, report)
+            result = minimized(method, problem, path, options, report)
     except KeyboardInterrupt:  # outside the iterations, which return their current point
         record_interrupt()
         result = _the_guess(problem, path, Stop.INTERRUPTED)

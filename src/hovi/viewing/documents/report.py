@@ -31,7 +31,7 @@ from hovi.system.deadline import Deadline, OutOfTimeError
 from hovi.system.files import reason, whole_file
 from hovi.version import __version__
 from hovi.viewing.plotting import motion_figure
-from hovi.viewing.recorded_limits import imposed_limits, kept_distances
+from hovi.viewing.recorded_limits import imposed_limits, kept_distances, led_back_sentence
 from hovi.viewing.replay_session import page_of
 
 Array = npt.NDArray[np.float64]
@@ -154,6 +154,8 @@ def _margins(trajectory: Trajectory) -> Iterator[Row]:
     if limits is None:
         yield "limits", "none were imposed"
     else:
+        if limits.excused:
+            yield "start", led_back_sentence(trajectory)
         margin = closeness(trajectory, limits)
         whose = "limits" if "limits" in trajectory.metadata else "loosest limits of any segment"
         for k, kind in enumerate(KINDS[: len(margin)]):

@@ -63,19 +63,20 @@ def unavoidable_torque(problem: TrajectoryProblem, limits: Limits) -> str:
         if not here.bounded[3].any() or problem.free_ends[i, :2].any():
             continue
         bounds = _accelerations(problem, here, i)
+        given = bool((bounds[0] == bounds[1]).all())
         if np.isinf(bounds).all():
             continue
         low, high = _torques(problem, scene, i, *bounds)
         over = np.maximum(here.lower[3] - high, low - here.upper[3]) / here.ranges[3]
         over[scene.passive_coordinates] = -np.inf
+        over[[x.coordinate for x in limits.excused if x.limit == "tau" and i == 0]] = -np.inf
         k = int(np.argmax(over))
         if over[k] > here.tolerance:
             nearest = low[k] if low[k] > here.upper[3, k] else high[k]
-            fixed = bool((bounds[0] == bounds[1]).all())
             return (
                 f"the torque of joint {_name(problem, k)!r} at the {end} is "
-                f"{'' if fixed else 'at best '}{nearest:.4g} {_unit(problem, k)}"
-                f"{'' if fixed else ' at any acceleration within the limits'}, outside its limits "
+                f"{'' if given else 'at best '}{nearest:.4g} {_unit(problem, k)}"
+                f"{'' if given else ' at any acceleration within the limits'}, outside its limits "
                 f"[{here.lower[3, k]:.6g}, {here.upper[3, k]:.6g}]; change the {end} or the load, "
                 "or widen the limits"
             )

@@ -34,8 +34,11 @@ class Pace:
 
     @classmethod
     def of(cls, limits: Limits) -> Pace:
-        """The pace that limits allow, exceeded by their tolerance."""
+        """The pace that limits allow, exceeded by their tolerance and by what is excused."""
         slack = limits.tolerance * limits.ranges[1:3]
+        for each in limits.excused:
+            if each.limit in ("v", "a"):
+                slack[each.row - 1, each.coordinate] += each.excess
         low, high = limits.lower[1:3] - slack, limits.upper[1:3] + slack
         fastest = np.maximum(np.abs(low[1]), np.abs(high[1]))
         down, up = np.maximum(-low[0], 0.0), np.maximum(high[0], 0.0)

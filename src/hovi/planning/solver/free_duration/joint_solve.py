@@ -30,12 +30,13 @@ def solves_jointly(problem: TrajectoryProblem) -> bool:
 
     Not with equations or obstacles, on which more depends than the discrete Lagrangian and the
     limits at the points; not with limits on the torque rate, which are imposed after a first solve;
-    nor on grids of so many intervals that they need the merge tree.
+    not from a start outside its limits, whose way back takes a time of its own; nor on grids of so
+    many intervals that they need the merge tree.
     """
     simple = not (problem.constrained or problem.periodic or problem.via)
     timed = problem.ld.lagrangian.timed or problem.ld.segments is not None
     limits = problem.limits
-    rates = limits is not None and limits.on_torque_rate
+    rates = limits is not None and (limits.on_torque_rate or bool(limits.excused))
     small = problem.grid.intervals <= MAX_BAND_INTERVALS
     return simple and not timed and small and not rates and problem.distances is None
 

@@ -24,7 +24,9 @@ from hovi.discrete.interval_batch import Coordinates
 from hovi.discrete.interval_paths import scaled_data
 from hovi.optimize.bounded_objective import Refinement
 from hovi.planning.problem.limits import Limits
-from hovi.planning.solver.limits.limited_coordinates import LimitedCoordinates
+from hovi.planning.problem.way_back.excused import Excused
+from hovi.planning.solver.limits.graded_parts import GivenEnds, graded
+from hovi.planning.solver.limits.limited_coordinates import DERIVATIVES, LimitedCoordinates
 from hovi.planning.solver.limits.limited_parts import LimitedParts
 from hovi.robot.space.configuration_space import ConfigurationSpace
 from hovi.schemes.control_points import control_degree, control_nodes, control_rows
@@ -60,6 +62,7 @@ class LimitRows:
         are given if None. A control point that is given with an end has no row.
     halvings: of all intervals for the control points of positions, and for those of derivatives.
     barrier: the last barrier parameter, relative to the mean density of the cost.
+    ends: beside which parts are short enough for what is given there; None where it is not known.
 
     bounds: lower and upper ones of the E rows, (E,) each. weights: of the rows in a barrier, (E,),
     in [s]. at_nodes: cache of `forces_of`.
@@ -78,6 +81,7 @@ class LimitRows:
         free_ends: Mask | None = None,
         halvings: tuple[int, int] = (0, 0),
         barrier: float = 0.0,
+        ends: GivenEnds | None = None,
     ) -> None:
         self.grid = grid
         self.space = space
@@ -89,7 +93,8 @@ class LimitRows:
         self.max_loss = max(MAX_LOSS, LOSS_RATIO * barrier)
         self.of = LimitedCoordinates.of(limits, grid, space)
         depth = np.where(self.of.order == 0, *halvings)
-        self.parts = LimitedParts.halved(grid.intervals, depth)
+        halved = LimitedParts.halved(grid.intervals, depth)
+        self.parts = graded(halved, grid, limits, self.of, ends)
         self._set(self._rows_of(self.parts))
 
     def copied(self) -> LimitRows:
@@ -124,6 +129,7 @@ class LimitRows:
         grid: begins with that interval, whose length may be another one.
         """
         rows, left = self.copied(), self.parts.at(self.parts.k >= first)
+        rows.limits = dataclasses.replace(self.limits, excused=())  # in time of the whole motion
         rows.grid, rows.parts = grid, dataclasses.replace(left, k=left.k - first)
         rows._set(rows._rows_of(rows.parts))
         now, before = rows._places_from(first), self._places
@@ -136,6 +142,19 @@ class LimitRows:
         rows = self.on(grid)
         rows.fixed = True
         return rows
+
+    def between(self, limits: Limits, ends: GivenEnds) -> tuple[LimitRows, Index]:
+        """The rows of a motion between other ends, and those at their places; or -1.
+
+        limits: which may excuse another start.
+        """
+        parts = graded(self.parts, self.grid, limits, self.of, ends)
+        if limits.excused == self.limits.excused and len(parts) == len(self.parts):
+            return self, np.arange(self.size)
+        rows = self.copied()
+        rows.limits, rows.parts = limits, parts
+        rows._set(rows._rows_of(rows.parts))
+        return rows, _found(rows._places, self._places) if rows.size else np.arange(0)
 
     def freed(self) -> LimitRows:
         """The same, which may be refined."""
@@ -231,11 +250,24 @@ class LimitRows:
         ranges = self.of.ranges[self.coordinate]
         k = np.minimum(self.intervals, len(self.of.lower) - 1)
         lower, upper = (each[k, self.coordinate] for each in (self.of.lower, self.of.upper))
+        for each in self.limits.excused:
+            mine, wider = self._wider(each)
+            (upper if each.side > 0 else lower)[mine] += each.side * wider
         self.bounds, self.weights = (lower / ranges, upper / ranges), self._share_of_intervals()
         scale = 1.0 / (ranges * self.grid.steps[self.intervals] ** self.orders)[:, None]
         base = np.where(self.orders == 0, 1.0 / ranges, 0.0)[:, None]
         self._regular = np.concatenate([base, rows.table * scale], axis=1)
         self._beyond = (rows.table - rows.beside) * scale
+
+    def _wider(self, excused: Excused) -> tuple[Index, Array]:
+        """The rows of what is excused, and by how much their bounds are wider."""
+        order = DERIVATIVES.get(excused.limit, -1)
+        mine = np.flatnonzero((self.orders == order) & (self.joints == excused.coordinate))
+        part, h = self._rows.part[mine], self.grid.steps[self.intervals[mine]]
+        begin = self.grid.t[self.intervals[mine]] + h * self.parts.left[part]
+        degree = control_degree(self.grid.order, self.grid.inner_modes, max(order, 0))
+        points = excused.control_points(begin, h * self.parts.width[part], degree)
+        return mine, points[np.arange(len(mine)), self._rows.number[mine]]
 
     def _share_of_intervals(self) -> Array:
         """The weights."""

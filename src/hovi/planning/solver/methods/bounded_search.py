@@ -38,6 +38,7 @@ from hovi.planning.solver.augmented_lagrangian_rounds import (
 from hovi.planning.solver.bounded_action import BoundedAction
 from hovi.planning.solver.central_path import CentralPath
 from hovi.planning.solver.clearance_outputs import EXTRA_CLEARANCE, ClearanceOutputs
+from hovi.planning.solver.limits.graded_parts import GivenEnds
 from hovi.planning.solver.limits.limit_rows import LimitRows
 from hovi.planning.solver.limits.row_forces import forces_of, joined
 from hovi.planning.solver.methods.method import Report
@@ -107,17 +108,16 @@ class BoundedSearch:
         distances = self.problem.distances
         self.clearance: ClearanceOutputs | None = None
         self.near: ClearanceRows | None = None
-        if distances is not None:
-            if self.lazy:
-                self.near = self.no_near_rows()
-            else:
-                self.clearance = ClearanceOutputs(distances, self.bounded_distance)
+        if distances is not None and self.lazy:
+            self.near = self.no_near_rows()
+        elif distances is not None:
+            self.clearance = ClearanceOutputs(distances, self.bounded_distance)
         self.margins = self.no_margins()
         if self.along is not None and not self.along.fits(self.problem.grid):
             self.along = None  # a round before has halved intervals
-        self.along = self.along and self.along.between(self.problem.free_ends)
-        known = None if self.along is None else self.along.rows
-        self.rows = self.coarse_rows() if known is None else known.copied()
+        self.along = self.along and self.along.from_ends_of(self.problem)
+        known = self.along and self.along.rows
+        self.rows = known.copied() if known else self.coarse_rows()
         self.tightened: tuple[Array, Array] | None = None
         self.points: list[tuple[float, DiscretePath]] = []
         self.solved: tuple[Bounded, BoundedAction] | None = None
@@ -148,8 +148,8 @@ class BoundedSearch:
 
     def _rows(self, halvings: tuple[int, int]) -> LimitRows:
         problem, limits, barrier = self.problem, self.limits, self.options.barrier
-        space, free = problem.coordinates.curved_space, problem.free_ends
-        return LimitRows(problem.grid, limits, space, free, halvings, barrier)
+        ends = problem.free_ends, halvings, barrier, GivenEnds.of(problem)
+        return LimitRows(problem.grid, limits, problem.coordinates.curved_space, *ends)
 
     def no_near_rows(self) -> ClearanceRows:
         """No rows of distances yet."""

@@ -19,7 +19,7 @@ def motion_of(result: MethodResult) -> Trajectory:
         "n_neg": result.n_neg,
     }
     if problem.limits is not None and problem.limited:
-        parts = problem.limits.parts
+        parts = problem.limits.with_excused_parts.parts
         if parts:  # under another name: `limits` are those of the whole motion
             metadata["segment_limits"] = [each.to_dict() for each in parts]
         else:

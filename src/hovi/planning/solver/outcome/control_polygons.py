@@ -8,6 +8,7 @@ they are within the bound or the curve itself is over it: the answer needs no sa
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import cache
 from math import comb
 
@@ -16,7 +17,9 @@ import numpy.typing as npt
 
 from hovi.discrete.interval_paths import scaled_data
 from hovi.discrete.trajectory import Trajectory
-from hovi.planning.solver.limits.limited_coordinates import LimitedCoordinates
+from hovi.planning.problem.limits import Limits
+from hovi.planning.problem.way_back.excused import Excused
+from hovi.planning.solver.limits.limited_coordinates import DERIVATIVES, LimitedCoordinates
 from hovi.schemes.control_points import control_rows
 
 Array = npt.NDArray[np.float64]
@@ -26,36 +29,65 @@ MOST_HALVINGS = 40
 the control points are nearer to the curve than rounding errors."""
 
 
-def exceeds(motion: Trajectory, limited: LimitedCoordinates, most: float) -> bool:
+def exceeds(motion: Trajectory, limits: Limits, limited: LimitedCoordinates, most: float) -> bool:
     """Whether a limited coordinate is over a bound anywhere by more than a share of its range.
 
-    most: the share.
+    limited: the coordinates of the limits that are polynomials. most: the share.
     """
     orders = map(int, np.unique(limited.order))
-    return any(_exceeds(each, most) for j in orders for each in _over_bounds(motion, limited, j))
+    found = (each for order in orders for each in _over_bounds(motion, limits, limited, order))
+    return any(_exceeds(each, most) for each in found)
 
 
-def _over_bounds(motion: Trajectory, limited: LimitedCoordinates, order: int) -> list[Array]:
-    """Control points over the upper and below the lower bounds, as shares, (N C, d + 1) each."""
+def _over_bounds(
+    motion: Trajectory, limits: Limits, limited: LimitedCoordinates, order: int
+) -> Iterator[Array]:
+    """Control points over the upper and below the lower bounds, as shares, (M, d + 1) each."""
     own = np.flatnonzero(limited.order == order)
-    points = _control_points(motion, order)[:, :, limited.joint[own]].transpose(0, 2, 1)
-    lower, upper = (each[:, own, None] for each in (limited.lower, limited.upper))
-    ranges = limited.ranges[own, None]
-    sides = (points - upper) / ranges, (lower - points) / ranges
-    return [side.reshape(-1, points.shape[2]) for side in sides]
+    whole = _control_points(motion, order, np.zeros(1), np.ones(1))[:, 0]
+    points = whole[:, :, limited.joint[own]].transpose(0, 2, 1)
+    for side, bounds in ((1, limited.upper), (-1, limited.lower)):
+        over = side * (points - bounds[:, own, None])
+        for each in limits.excused:
+            if each.side == side and DERIVATIVES.get(each.limit) == order:
+                column = int(np.flatnonzero(limited.joint[own] == each.coordinate)[0])
+                yield _led_back(motion, each, over[:, column]) / limited.ranges[own[column]]
+        yield (over / limited.ranges[own, None]).reshape(-1, points.shape[2])
 
 
-def _control_points(motion: Trajectory, order: int) -> Array:
-    """Control points of q^(order) on all intervals, (N, d + 1, nv)."""
+def _led_back(motion: Trajectory, excused: Excused, over: Array) -> Array:
+    """Control points of what is excused over its wider bound, until it is inside, (M, d + 1).
+
+    over: those over the bound itself on all intervals, (N, d + 1), which these are taken out of.
+    """
+    grid, degree = motion.grid, over.shape[1] - 1
+    last = int(np.searchsorted(grid.t[1:], excused.until))
+    whole = over[:last].copy() - excused.control_points(grid.t[:last], grid.steps[:last], degree)
+    over[:last] = -np.inf
+    if last == grid.intervals:
+        return whole
+    h = grid.steps[last]
+    cut = float(np.clip((excused.until - grid.t[last]) / h, 0.0, 1.0))
+    left, width = np.array([0.0, cut]), np.array([cut, 1.0 - cut])
+    order = DERIVATIVES[excused.limit]
+    parts = _control_points(motion, order, left, width)[last, :, :, excused.coordinate]
+    parts = over[last, :1] + excused.side * (parts - parts[0, 0])
+    parts[:1] -= excused.control_points(grid.t[last : last + 1], cut * h * np.ones(1), degree)
+    over[last] = -np.inf
+    return np.concatenate([whole, parts])
+
+
+def _control_points(motion: Trajectory, order: int, left: Array, width: Array) -> Array:
+    """Control points of q^(order) on P parts of all intervals, (N, P, d + 1, nv)."""
     grid, path, space = motion.grid, motion.path, motion.space
-    whole = np.zeros(1), np.ones(1)
-    table = control_rows(*whole, grid.order, grid.inner_modes, order)[0][0]
+    table = control_rows(left, width, grid.order, grid.inner_modes, order)[0]
     numbers, steps = np.arange(grid.intervals), grid.steps[:, None]
-    points = np.matmul(table, scaled_data(path, numbers, steps, grid.inner_modes))
+    data = scaled_data(path, numbers, steps, grid.inner_modes)
+    points = np.matmul(table, data[:, None])
     if order > 0:
-        return np.asarray(points / steps[:, :, None] ** order)
+        return np.asarray(points / steps[:, :, None, None] ** order)
     q = path.q if space is None else space.coordinates(path.q)
-    return np.asarray(points + q[:-1, None])
+    return np.asarray(points + q[:-1, None, None])
 
 
 def _exceeds(points: Array, most: float) -> bool:

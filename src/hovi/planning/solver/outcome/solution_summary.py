@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError
 from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.problem.way_back.excused import Excused
 from hovi.planning.solver.outcome.margins import Margins, margins_of
 from hovi.planning.solver.outcome.violation import violation_of
 from hovi.planning.solver.status import Status
@@ -53,6 +54,15 @@ class SolutionSummary(Summarized):
     def usable(self) -> bool:
         """Whether ends, limits, distances and equations hold, be the motion a minimum or not."""
         return not self.violation
+
+    @property
+    def excused(self) -> tuple[Excused, ...]:
+        """What the start exceeds of its limits, by how much at most and until when.
+
+        The motion is led back: from then on all limits hold, and until then these wider ones.
+        """
+        limits = None if self.problem is None else self.problem.limits
+        return () if limits is None else limits.excused
 
     @property
     def _solved_problem(self) -> TrajectoryProblem:

@@ -60,7 +60,7 @@ def _exceeded(motion: Trajectory, limits: Limits) -> bool:
         return False
     most = max(MET, limits.tolerance)
     limited = LimitedCoordinates.of(limits, motion.grid, motion.space)
-    if exceeds(motion, limited, most):
+    if exceeds(motion, limits, limited, most):
         return True
     sampled = excess_of(motion, limits, limited.others(limits))
     return not bool(np.max(sampled) <= most)

@@ -43,6 +43,14 @@ def is_near(goal: FrameGoal, problem: TrajectoryProblem, path: DiscretePath) -> 
     return distance <= NEAR_DISTANCE and angle <= NEAR_ANGLE
 
 
+def with_strictness(problem: TrajectoryProblem, strict: bool | None) -> TrajectoryProblem:
+    """The same problem, whose start outside its limits is refused or led back; as it is if None."""
+    limits = problem.limits
+    if strict is None or limits is None or strict is limits.strict:
+        return problem
+    return dataclasses.replace(problem, limits=dataclasses.replace(limits, strict=strict))
+
+
 def as_start(given: End, problem: TrajectoryProblem) -> State:
     """A start, from whatever `plan` takes. A frame is met in the configuration nearest to the old.
 

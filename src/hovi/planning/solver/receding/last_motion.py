@@ -72,6 +72,11 @@ def last_motion(
     return MethodResult(problem, path, cost, status, message, steps, central=central)
 
 
+def starts_there(problem: TrajectoryProblem, path: DiscretePath) -> bool:
+    """Whether a path starts where a problem does."""
+    return not _miss(problem, path, 0, "starts")
+
+
 def misses(problem: TrajectoryProblem, path: DiscretePath) -> str:
     """How far the ends of a path are from the problem's, as a clause; "" if they are the same."""
     parts = [_miss(problem, path, 0, "starts")]

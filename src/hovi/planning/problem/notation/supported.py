@@ -1,0 +1,29 @@
+"""What problems of an order of the Lagrangian support."""
+
+from __future__ import annotations
+
+from hovi.errors import InputError
+from hovi.planning.problem.frame_goal import FrameGoal
+from hovi.planning.problem.notation.summaries import ProblemSummary
+
+LIMITED_ORDERS = 2, 3
+"""Orders of the Lagrangians whose problems may have limits, obstacles, via points and frames."""
+
+
+def require_supported(problem: ProblemSummary, order: int) -> None:
+    """Raise InputError for what a Lagrangian of this order does not support."""
+    limits = problem.limits
+    wanted = {
+        "limits": limits is not None and bool(limits.bounded.any()),
+        "obstacles": problem.clearance is not None and problem.clearance.wanted,
+        "via points": bool(problem.via),
+        "goals of frames": isinstance(problem.goal, FrameGoal),
+    }
+    named = [what for what, is_wanted in wanted.items() if is_wanted]
+    if order not in LIMITED_ORDERS and named:
+        raise InputError(
+            f"{' and '.join(named)} need a Lagrangian of order 2 or 3, and this one is of order "
+            f"{order}: leave them out."
+        )
+    if limits is not None:
+        limits.require_order(order)
