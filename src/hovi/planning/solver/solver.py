@@ -47,7 +47,12 @@ from hovi.planning.solver.receding.ends import (
     require_known,
     with_strictness,
 )
-from hovi.planning.solver.receding.last_motion import last_motion, meets, starts_there
+from hovi.planning.solver.receding.last_motion import (
+    last_motion,
+    meets,
+    out_of_time,
+    starts_there,
+)
 from hovi.planning.solver.status import Status, unfinished
 from hovi.planning.solver.warm_start import follow
 from hovi.scene.lagrangian import PointTerms
@@ -262,30 +267,28 @@ class _Again:
                 found = self._solved(deadline.part(SOLVE_SHARE).seconds_left, options)
                 if found.status is not Status.TIME_LIMIT:
                     done = judged(found) if self.check is None else self.check(found)
-                    return done if done.success else self._at_rest(done) or done
+                    if done.success or done.usable:
+                        return done
+                    return self._at_rest(done.status, done.message, done.nit) or done
                 if np.isfinite(found.cost) and self._meets(found):
                     return self._kept(found)
-                if stopped := self._at_rest(found):
-                    return stopped
             except OutOfTimeError:
                 found = None
         steps = 0 if found is None else found.nit
+        if stopped := self._at_rest(Status.TIME_LIMIT, f"{out_of_time(steps)}.", steps):
+            return stopped
         result = last_motion(self.problem, self.path, self.central, steps, last)
         return dataclasses.replace(solution_of(result, 0.0, 0.0), check=self.check)
 
-    def _at_rest(self, found: Solution) -> Solution | None:
-        """A braking motion, where neither the one found nor the last one can be executed."""
+    def _at_rest(self, status: Status, message: str, steps: int) -> Solution | None:
+        """A braking motion, unless the last motion is one from the start; None if none is found."""
         problem = self.problem
-        if not problem.limited or starts_there(problem, self.path) or found.usable:
-            return None
-        stopped = braking(problem)
+        unlimited = not problem.limited or starts_there(problem, self.path)
+        stopped = None if unlimited else braking(problem)
         if stopped is None:
             return None
-        message = f"{found.message} {BRAKES}"
-        cost, status = problem.ld.action(stopped.path), found.status
-        result = MethodResult(
-            stopped.problem, stopped.path, cost, status, message, found.nit, central=self.central
-        )
+        found = stopped.problem, stopped.path, problem.ld.action(stopped.path)
+        result = MethodResult(*found, status, f"{message} {BRAKES}", steps, central=self.central)
         return dataclasses.replace(solution_of(result, 0.0, 0.0), check=self.check)
 
     def _meets(self, found: Solution) -> bool:

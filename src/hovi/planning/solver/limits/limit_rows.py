@@ -266,7 +266,11 @@ class LimitRows:
         part, h = self._rows.part[mine], self.grid.steps[self.intervals[mine]]
         begin = self.grid.t[self.intervals[mine]] + h * self.parts.left[part]
         degree = control_degree(self.grid.order, self.grid.inner_modes, max(order, 0))
-        points = excused.control_points(begin, h * self.parts.width[part], degree)
+        end = begin + h * self.parts.width[part]
+        points = excused.control_points(begin, end - begin, degree)
+        within = end[end <= excused.until * (1.0 + 1e-12)]
+        # the next part, which reaches beyond, begins at this control point, too
+        points[end == within.max(initial=0.0), -1] = 0.0
         return mine, points[np.arange(len(mine)), self._rows.number[mine]]
 
     def _share_of_intervals(self) -> Array:

@@ -64,12 +64,17 @@ def last_motion(
     steps: of the solve that was ended. name: says what the motion is, as a clause.
     """
     missed = misses(problem, path) or "meets the ends; its limits were not checked"
-    message = (
-        f"the time limit was reached after {steps} steps, before a motion that meets the ends and "
-        f"the limits was found; {name}, which {missed}."
-    )
+    message = f"{out_of_time(steps)}; {name}, which {missed}."
     cost, status = cost_of(problem, path), Status.TIME_LIMIT
     return MethodResult(problem, path, cost, status, message, steps, central=central)
+
+
+def out_of_time(steps: int) -> str:
+    """That no motion was found in time, as a clause. steps: of the solve that was ended."""
+    return (
+        f"the time limit was reached after {steps} steps, before a motion that meets the ends and "
+        "the limits was found"
+    )
 
 
 def starts_there(problem: TrajectoryProblem, path: DiscretePath) -> bool:
