@@ -6,7 +6,6 @@ import numpy as np
 
 from hovi.discrete.state import Periodic
 from hovi.planning.clearance.clearance_violation import less_than_margin
-from hovi.planning.problem.arms.limit_set import KIND_NAMES
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.goal_clearance import goal_in_obstacle
 from hovi.planning.problem.limits import Limits

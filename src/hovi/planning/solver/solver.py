@@ -261,21 +261,25 @@ class _Again:
 
     def within(self, deadline: Deadline, last: str, **options: Any) -> Solution:
         """The solution, or what there is at the deadline. last: names the other motion."""
+        found, begun = None, False
         with deadline.in_force():
             try:
                 raise_if_late()
+                begun = True
                 found = self._solved(deadline.part(SOLVE_SHARE).seconds_left, options)
                 if found.status is not Status.TIME_LIMIT:
                     done = judged(found) if self.check is None else self.check(found)
                     if done.success or done.usable:
                         return done
                     return self._at_rest(done.status, done.message, done.nit) or done
-                if np.isfinite(found.cost) and self._meets(found):
+                solved = found.problem or self.problem
+                if np.isfinite(found.cost) and meets(solved, found.trajectory.path):
                     return self._kept(found)
             except OutOfTimeError:
-                found = None
+                pass
         steps = 0 if found is None else found.nit
-        if stopped := self._at_rest(Status.TIME_LIMIT, f"{out_of_time(steps)}.", steps):
+        said = f"{out_of_time(steps)}."
+        if begun and (stopped := self._at_rest(Status.TIME_LIMIT, said, steps)):
             return stopped
         result = last_motion(self.problem, self.path, self.central, steps, last)
         return dataclasses.replace(solution_of(result, 0.0, 0.0), check=self.check)
@@ -290,9 +294,6 @@ class _Again:
         found = stopped.problem, stopped.path, problem.ld.action(stopped.path)
         result = MethodResult(*found, status, f"{message} {BRAKES}", steps, central=self.central)
         return dataclasses.replace(solution_of(result, 0.0, 0.0), check=self.check)
-
-    def _meets(self, found: Solution) -> bool:
-        return meets(found.problem or self.problem, found.trajectory.path)
 
     def _solved(self, time_limit: float | None, options: dict[str, Any]) -> Solution:
         problem, path, goal = self.problem, self.path, self.problem.goal
