@@ -157,8 +157,12 @@ def friction(c: float, w: float) -> Case:
     def density(t: Array, z: Any, tau: Array) -> Array:
         return half_square(tau + 3.0 * np.tanh(z.v / w))
 
+    def slower(t: Array, z: Any) -> Array:
+        """The velocity of the joint that is nearest to standing still."""
+        return np.take_along_axis(z.v, np.abs(z.v).argmin(axis=1)[:, None], axis=1)[:, 0]
+
     effect = E.DryFriction(coulomb=3.0, width=w)
-    return Case("dry friction", effect, lambda t, z: z.v[:, 1], 0.0, w, density)
+    return Case("dry friction", effect, slower, 0.0, w, density)
 
 
 def wall(c: float, w: float) -> Case:

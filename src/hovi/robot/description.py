@@ -18,6 +18,7 @@ from hovi.robot.source import RobotSource
 from hovi.robot.space.angle_ranges import ranges_in_degrees
 from hovi.robot.space.joint_kinds import ANGLE, FLOATING, kind_of
 from hovi.robot.urdf.check import checked_urdf
+from hovi.robot.urdf.closed_loops import closed_loops
 from hovi.robot.urdf.spelling import ignored_names
 
 Array = npt.NDArray[np.float64]
@@ -164,6 +165,8 @@ def _notes(model: pin.Model, source: RobotSource) -> Iterator[str]:
             f"the position range of {_some(unbounded)} is not enforced, since its leader is a "
             "continuous joint"
         )
+    if ties := closed_loops(robot):
+        yield f"not kept, so that its links move freely: {_some(ties)}"
     if names := ignored_names(robot):
         yield f"ignored, since URDF has no such elements and attributes: {_some(names)}"
     moving = _moving_links(source, robot)

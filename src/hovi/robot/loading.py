@@ -11,7 +11,7 @@ import pinocchio as pin
 
 from hovi.checks.arguments import check_arguments_except
 from hovi.checks.kinds import is_number
-from hovi.errors import InputError, ModelError, expect
+from hovi.errors import InputError, ModelError, expect, warn
 from hovi.robot.example_robots import BUILT_IN_CODE, build_in_code, example_robot, rotor_armature
 from hovi.robot.formats.descriptions import description_of
 from hovi.robot.formats.mjcf import model_of_mjcf
@@ -23,7 +23,8 @@ from hovi.robot.model import build_full_model, build_model, locked_model
 from hovi.robot.robot import Robot
 from hovi.robot.source import MAX_POSITION, RobotSource, text_hash
 from hovi.robot.srdf import read_srdf_file
-from hovi.robot.urdf.check import MAX_DOF, read_urdf
+from hovi.robot.urdf.check import MAX_DOF, checked_urdf, read_urdf
+from hovi.robot.urdf.closed_loops import closed_loops
 
 Locked = tuple[str, ...] | Mapping[str, float]
 """Joints at their neutral configuration, or their positions in [rad] or [m] by name."""
@@ -62,6 +63,7 @@ def file_source(
     """
     is_xacro = format_of(path) == "xacro"
     text = urdf_of_xacro(path, package_dirs) if is_xacro else read_urdf(path)
+    _warn_of_loops(text, path.name)
     return RobotSource(
         kind="urdf",
         reference=path.name,
@@ -74,6 +76,16 @@ def file_source(
         srdf=None if srdf is None else read_srdf_file(srdf),
         mimic=mimic,
     )
+
+
+def _warn_of_loops(urdf: str, name: str) -> None:
+    """Warn of loops that are not kept; `hovi info` has them for examples, too."""
+    if ties := closed_loops(checked_urdf(urdf, name)):
+        warn(
+            f"URDF {name!r}: its links move freely, without {', '.join(ties[:3])}"
+            f"{f' and {len(ties) - 3} more' if len(ties) > 3 else ''}: lock the joints of the "
+            "loop, or plan for a robot without it."
+        )
 
 
 def example_source(
