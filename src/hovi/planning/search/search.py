@@ -10,6 +10,7 @@ from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError
 from hovi.planning.clearance.clearance_violation import near_pairs
 from hovi.planning.paths.first_guesses import FirstGuesses, first_guesses
+from hovi.planning.problem.presolve.ramps import graded_to_ramps
 from hovi.planning.refinement.error_estimate import with_metadata
 from hovi.planning.refinement.faults.narrow_features import NARROW
 from hovi.planning.refinement.hp_refinement import galerkin_with_more_points
@@ -50,7 +51,6 @@ class Search:
     """The search for the best motion of a job.
 
     fine: the requested job, with the guess among its options. deadline: of the whole search.
-    free: bounds of a free duration; None for a given one.
     without: the same without self-collision, which is searched first; None where there is none.
     free: bounds of a free duration; None for a given one. ends: as they were chosen from branches.
     """
@@ -100,6 +100,8 @@ class Search:
         explored = self._explored(job)
         if self._needs_more_points(explored):
             return dataclasses.replace(self, fine=with_more_points(self.fine))._run()
+        if (graded := self._with_ramps(explored)) is not None:
+            return dataclasses.replace(self, fine=graded)._run()
         if self.free is None or explored.minima[0].success:
             return self._finished(job, explored)
         return self._from_another_duration(self.free, explored)
@@ -109,6 +111,17 @@ class Search:
         found = explored.minima[0]
         ended = found.success or found.status in STOPPED or interrupted()
         return has_few_points(self.fine) and not ended
+
+    def _with_ramps(self, explored: Exploration) -> Job | None:
+        """The job with nodes where joints that are pressed for time speed up and slow down.
+
+        None if the motion on this grid is not infeasible, if the grid is given, or if it has them.
+        """
+        fine, infeasible = self.fine, explored.minima[0].status is Status.INFEASIBLE
+        if not infeasible or fine.tolerance is None or self.free is not None or interrupted():
+            return None
+        grid = graded_to_ramps(fine.problem())
+        return None if grid.intervals == fine.grid.intervals else fine.on(grid)
 
     def _from_another_duration(
         self, free: FreeDuration, explored: Exploration
