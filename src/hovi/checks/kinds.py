@@ -6,6 +6,7 @@ import inspect
 import math
 import numbers
 import operator
+import sys
 import types
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, Literal, Union, get_args, get_origin
@@ -19,7 +20,6 @@ MAX_WHOLE_NUMBER = 10**18
 """Largest magnitude of an integer: larger ones overflow in compiled code."""
 MAX_DIMENSIONS = 64
 """Of an array of NumPy."""
-_NESTING = (list, tuple, np.ma.MaskedArray)
 _QUOTED = (str, bool, int, float, types.NoneType)
 _ARRAY_LIKE = set(get_args(npt.ArrayLike))
 
@@ -93,7 +93,7 @@ def shown(value: Any) -> str:
         text = repr(value) if not isinstance(value, int) or abs(value) < 10**40 else "an integer"
         return text if len(text) <= 80 else f"{text[:60]}..."
     if isinstance(value, np.ndarray):
-        masked = "a masked" if isinstance(value, np.ma.MaskedArray) else "an"
+        masked = "a masked" if _is_masked_array(value) else "an"
         return f"{masked} array of {value.dtype} of shape {value.shape}"
     name = f"class {value.__name__}" if isinstance(value, type) else type(value).__name__
     return _with_article(name)
@@ -133,7 +133,7 @@ def _number(value: Any) -> Any:
         return value
     if isinstance(value, np.ndarray) and value.ndim == 0:
         value = value[()]
-    if value is np.ma.masked:
+    if _is_masked_array(value):  # np.ma.masked: what has a value became it above
         raise MismatchError("a number that is not masked")
     if not isinstance(value, numbers.Real) or isinstance(value, bool | np.timedelta64):
         raise MismatchError
@@ -252,12 +252,17 @@ def _masks(value: Any, depth: int = 0) -> bool:
 
     NumPy converts to what is behind the mask.
     """
-    if isinstance(value, np.ma.MaskedArray):
+    if _is_masked_array(value):
         return bool(np.ma.is_masked(value))
     if not isinstance(value, list | tuple) or depth > MAX_DIMENSIONS:
         return False
-    nested = any(issubclass(kind, _NESTING) for kind in set(map(type, value)))
+    nested = any(issubclass(kind, list | tuple | np.ndarray) for kind in set(map(type, value)))
     return nested and any(_masks(each, depth + 1) for each in value)
+
+
+def _is_masked_array(value: Any) -> bool:
+    """Whether a value is a masked array, of which there are none before numpy.ma is imported."""
+    return "numpy.ma" in sys.modules and isinstance(value, np.ma.MaskedArray)
 
 
 def _has_booleans(value: Any) -> bool:

@@ -120,7 +120,7 @@ def test_a_damaged_file_in_the_cache_is_made_again(
 @pytest.fixture
 def endless(u_shape: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A mesh whose division takes more than a minute, and ends then."""
-    worker = tmp_path / "endless.py"
+    worker = (tmp_path / "endless").with_suffix(".py")
     worker.write_text("import time\ntime.sleep(100)\n")
     monkeypatch.setattr(convex_parts, "_WORKER", worker)
     monkeypatch.setattr(convex_parts, "find_spec", lambda name: True)

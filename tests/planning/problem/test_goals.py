@@ -185,7 +185,8 @@ def test_replanning_to_a_goal_turned_by_half_a_turn_turns_the_hand() -> None:
     pose = at_goal(task, "tool0")
     goal = hovi.FrameGoal("tool0", pose)
     rotors = hovi.Scene(task.scene.robot, [hovi.effects.Gravity(), hovi.effects.Armature(0.1)])
-    first = hovi.plan(rotors, task.start, goal, 2.5, limits="none", self_collision=False)
+    fine = {"scheme": "galerkin-2x8", "intervals": 48}
+    first = hovi.plan(rotors, task.start, goal, 2.5, limits="none", self_collision=False, **fine)
     turned = pose.rotation @ np.diag([-1.0, -1.0, 1.0])
     again = first.replan(goal=hovi.FrameGoal("tool0", position=pose.translation, rotation=turned))
     assert again.success, again.message

@@ -30,7 +30,6 @@ from hovi.planning.search.free_duration import FreeDuration
 from hovi.planning.search.job import Job, split_for_charts
 from hovi.planning.search.multistart import Exploration, Pool, default_processes, explore
 from hovi.planning.solver.initial_path import guess_path
-from hovi.planning.solver.methods.active_pairs import with_clearance
 from hovi.planning.solver.solver import Solution
 from hovi.planning.solver.status import Status
 from hovi.system.dataclass import dataclass
@@ -80,6 +79,9 @@ class Search:
 
     def _of_whole(self, free: Solution) -> Solution | None:
         """A solution without self-collision as one with; None if links come too near in it."""
+        # Here, since a robot without collision shapes plans without these modules.
+        from hovi.planning.solver.methods.active_pairs import with_clearance
+
         clearance, problem = self.fine.problem().clearance, free.problem or self.fine.problem()
         assert clearance is not None
         problem = with_clearance(on_grid_of(problem, free), clearance)
