@@ -102,9 +102,10 @@ def test_without_a_browser_the_robot_is_drawn_by_bars(
 
 @with_browser
 def test_no_other_user_can_drive_the_browser_that_films(motion: Trajectory) -> None:
+    others = set(descendants(os.getpid()))  # such as workers that wait for another plan
     with headless_browser.headless_tab(SIZE) as tab:
         assert tab.value("1 + 1") == 2
-        browsers = descendants(os.getpid())
+        browsers = [each for each in descendants(os.getpid()) if each not in others]
         assert len(browsers) >= 2
         assert listening_addresses(browsers) == []
         given = {argument for pid in browsers for argument in arguments(pid)}
