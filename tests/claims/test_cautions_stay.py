@@ -55,6 +55,15 @@ def curve_cost(motion: hovi.Trajectory) -> float:
     return float(np.trapezoid(0.5 * np.square(tau).sum(axis=1), t))
 
 
+def test_links_that_are_kept_apart_are_no_limits(motion: hovi.Trajectory) -> None:
+    """A motion without limits says so whether self-collision was looked at or not."""
+    assert motion.robot is not None
+    scene, ends = hovi.Scene(motion.robot, []), motion.q[[0, -1]]
+    found = hovi.plan(scene, *ends, 0.6, limits="none", self_collision=True)
+    assert found.success, found.message
+    assert any(BEYOND in each for each in found.trajectory.cautions)
+
+
 @pytest.mark.parametrize("intervals", [50, 60, 70, 100, 200])
 def test_a_success_whose_curve_costs_more_says_by_how_much(
     two_link: hovi.Robot, intervals: int

@@ -116,3 +116,12 @@ def test_a_motion_of_a_free_duration_is_the_curve_of_its_nodes() -> None:
     begin = trajectory.sample_intervals(k + 1, np.zeros(len(k)))
     assert np.abs(end.q - begin.q).max() < 1e-9
     assert np.abs(end.v - begin.v).max() < 1e-7
+
+
+def test_a_braking_motion_has_the_price_of_its_time(motion: hovi.Solution) -> None:
+    """Where no motion reaches a goal in the duration, one brakes from a start that is another."""
+    found = motion.replan(start=hovi.State(A, [0.1, 0, 0, 0, 0, 0]), goal=B + 3.0)
+    assert "brakes to rest" in found.message
+    T = found.trajectory.duration
+    expected = effort_by_pinocchio(found.problem.robot, found.trajectory) + PRICE * T
+    assert found.cost == pytest.approx(expected, rel=5e-2)

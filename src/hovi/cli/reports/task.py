@@ -101,10 +101,11 @@ def _frame_parts(goal: FrameGoal) -> list[str]:
 
 def _kept_from(task: Task) -> str:
     """The names of obstacles, and "itself" where links are kept apart; "" for nothing."""
-    options = task.options
+    from hovi.planning.clearance.self_collisions import names_shapes  # 10 ms
+
+    options, robot = task.options, task.scene.robot
     names = [repr(each.name) for each in options.clearance.obstacles]
-    has_shapes = "<collision" in (task.scene.robot.source.urdf or "")
-    apart = has_shapes if options.self_collision is None else options.self_collision
+    apart = names_shapes(robot) if options.self_collision is None else options.self_collision
     return ", ".join(names + (["itself"] if apart else []))
 
 

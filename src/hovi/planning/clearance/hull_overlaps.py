@@ -58,7 +58,9 @@ def hull_overlaps(
     their meshes do not: by Coal on the shapes as they were given.
     q: configurations (nq,) by what they are, such as "the start".
     """
-    apart = dataclasses.replace(clearance, obstacles=(), may_touch=(), self_collision=True)
+    apart = clearance
+    if clearance.obstacles or clearance.may_touch or not clearance.self_collision:
+        apart = dataclasses.replace(clearance, obstacles=(), may_touch=(), self_collision=True)
     distances, touching = distances_between(robot, apart), set(map(frozenset, clearance.may_touch))
     found = dict[tuple[str, str], HullOverlap]()
     for where, at in q.items():

@@ -59,9 +59,14 @@ def can_keep_apart(robot: Robot, may_touch: tuple[tuple[str, str], ...] = ()) ->
         return False
 
 
+def names_shapes(robot: Robot) -> bool:
+    """Whether the URDF of a robot names collision shapes, which may not be readable."""
+    return "<collision" in (robot.source.urdf or "")
+
+
 def not_looked_at(robot: Robot) -> str:
     """Why links of a robot with collision shapes cannot be kept apart, as a sentence, or ""."""
-    if "<collision" not in (robot.source.urdf or ""):
+    if not names_shapes(robot):
         return ""
     try:
         self_collision_pairs(robot)

@@ -63,22 +63,24 @@ def with_gaps(
     """
     if isinstance(clearance, PartOfClearance):
         return clearance
-    whole = dataclasses.replace(clearance, gaps=()) if clearance.gaps else clearance
-    distances, margin = distances_within_reach(robot, whole), float(whole.margin)
-    found = dict[tuple[str, str], float]()
+    distances, margin = distances_within_reach(robot, clearance), float(clearance.margin)
     if distances is None:
-        return whole
+        return clearance
+    found = dict[tuple[str, str], float]()
+    touching = np.array([pair.touching for pair in distances.pairs])
+    known = np.where(touching, 0.0, distances.allowance)  # the gaps of the clearance itself
     for i in (0, 1) if margin > MOST_GAP else ():
         if free[i, 0].any():
             continue
-        d = distances.values(distances.at(boundary[2 * i][None], i * duration), margin)[0]
+        at = distances.at(boundary[2 * i][None], i * duration)
+        d = distances.values(at, margin + float(known.max(initial=0.0)))[0] - known
         for k in np.flatnonzero((d < margin) & (d >= margin - MOST_GAP)):
             pair = distances.pairs[k].link, distances.pairs[k].other
             found[pair] = max(found.get(pair, 0.0), margin - float(d[k]) + ROUNDING)
     gaps = tuple((*pair, gap) for pair, gap in found.items())
     if gaps == tuple(clearance.gaps):
         return clearance
-    return dataclasses.replace(whole, gaps=gaps) if gaps else whole
+    return dataclasses.replace(clearance, gaps=gaps)
 
 
 @lru_cache(maxsize=16)

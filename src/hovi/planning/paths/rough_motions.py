@@ -8,6 +8,8 @@ with random bumps.
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import numpy.typing as npt
 
@@ -141,8 +143,7 @@ class _Batch:
         )
         cost = np.abs(batch.expanded(np.zeros((len(q0), BUMPS, robot.nv)))[0])
         scale = np.where(np.isfinite(cost), PENALTY * cost / duration, 0.0)
-        object.__setattr__(batch, "scale", scale)
-        return batch
+        return dataclasses.replace(batch, scale=scale)
 
     def expanded(self, bumps: Array) -> tuple[Array, Array, Array]:
         """Costs (C,), gradients (C, m) and Hessians (C, m, m) in m = BUMPS nv sizes of bumps."""

@@ -38,8 +38,7 @@ def contradiction(problem: TrajectoryProblem, limits: Limits) -> str:
 
 def _goal_leaves(problem: TrajectoryProblem) -> str:
     """What of the goal is outside its limits, or leads or came from outside; "" if nothing."""
-    limits = problem.limits
-    if limits is None or not limits.bounded.any() or problem.periodic:
+    if not problem.has_limits or problem.periodic:
         return ""
     return refused(problem.end_state(1), "goal")
 

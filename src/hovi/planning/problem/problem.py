@@ -340,10 +340,14 @@ class TrajectoryProblem(ProblemSummary):
         return bool(self.free_ends.any())
 
     @property
+    def has_limits(self) -> bool:
+        """Whether there are limits; distances are none."""
+        return self.limits is not None and bool(self.limits.bounded.any())
+
+    @property
     def limited(self) -> bool:
         """Whether there are limits or obstacles."""
-        bounded = self.limits is not None and self.limits.bounded.any()
-        return bool(bounded) or self.distances is not None
+        return self.has_limits or self.distances is not None
 
     @property
     def distances(self) -> Distances | None:

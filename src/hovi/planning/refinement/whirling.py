@@ -132,8 +132,7 @@ def whirl(solution: Solution) -> Whirl | None:
 def whirl_without_limits(solution: Solution) -> Whirl | None:
     """The joint that whirls most; None if none does, and within limits. Distances are no limits."""
     assert solution.problem is not None
-    limits = solution.problem.limits
-    return None if limits is not None and limits.bounded.any() else whirl(solution)
+    return None if solution.problem.has_limits else whirl(solution)
 
 
 def fault_of_whirling(

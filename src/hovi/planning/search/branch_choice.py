@@ -227,7 +227,7 @@ class _Choice:
         if not robot.space.flat or self.scene.terms.timed:
             yield from ((number, None) for number in chosen)
             return
-        q0, q1 = (np.array([each(pairs[i]) for i in chosen]) for each in (self._q0, _q1))
+        q0, q1 = self._configurations([pairs[i] for i in chosen])
         v0 = np.array([pairs[i].start.on(robot, "start")[1] for i in chosen])
         lagrangian = self.scene.effort_lagrangian(self.options.weight)
         limits = as_limits(robot, self.options.limits)
@@ -245,15 +245,17 @@ class _Choice:
     def _promising(self, pairs: list[_Pair]) -> list[int]:
         """Up to SOLVED pairs: the ones without further turns, and the cheapest cubics of others."""
         lagrangian = self.scene.effort_lagrangian(self.options.weight)
-        q0, q1 = (np.array([each(pair) for pair in pairs]) for each in (self._q0, _q1))
+        q0, q1 = self._configurations(pairs)
         cost = cubic_costs(lagrangian, self.scene.robot, q0, q1, self.duration)
         order = np.argsort(np.where(np.isfinite(cost), cost, np.inf), kind="stable")
         turned = [int(i) for i in order if pairs[i].turned][:TURNED]
         others = [int(i) for i in order if not pairs[i].turned]
         return others[: SOLVED - len(turned)] + turned
 
-    def _q0(self, pair: _Pair) -> Array:
-        return self._configuration(pair.start)
+    def _configurations(self, pairs: list[_Pair]) -> tuple[Array, Array]:
+        """Those at both ends of pairs, (P, nq) each."""
+        starts = [self._configuration(pair.start) for pair in pairs]
+        return np.array(starts), np.array([pair.q for pair in pairs])
 
     def _problem(self, pair: _Pair) -> TrajectoryProblem:
         """The motion between two ends on a few intervals, within the limits."""
@@ -270,10 +272,6 @@ class _Choice:
 
 
 _WITHOUT_MOTION = Status.INFEASIBLE, Status.DIVERGED
-
-
-def _q1(pair: _Pair) -> Array:
-    return pair.q
 
 
 def _rank(found: Solution) -> tuple[bool, bool, float]:

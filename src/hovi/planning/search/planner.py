@@ -13,7 +13,6 @@ from hovi.discrete.output.caution import COLLISION, LEFT_OUT, STATUS, WARNED, Ca
 from hovi.discrete.state import State, warn_of_degrees
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError, ModelError, SceneError, expect, warn
-from hovi.planning.clearance.clearance import Clearance
 from hovi.planning.clearance.distances import distances_between
 from hovi.planning.clearance.hull_overlaps import HullOverlap, hull_overlaps, met_sentence
 from hovi.planning.clearance.self_collisions import not_looked_at, pairs_left_out
@@ -149,12 +148,12 @@ def plan(
     warn_of_ends(scene.robot, job.start, job.goal, chosen, found.reason)
     for sentence in found.warnings:
         warn(sentence)
+    nothing = None
     if found.reason:
         nothing = infeasible_at_once(longest, chosen.guess, found.reason)
-        seconds = time.perf_counter() - began
-        return with_notes(nothing, [job.scene], job.options, apart, seconds)
-    if fault := job.fault_of_time:
+    elif fault := job.fault_of_time:
         nothing = unresolved_at_once(problem, chosen.guess, fault)
+    if nothing is not None:
         seconds = time.perf_counter() - began
         return with_notes(nothing, [job.scene], job.options, apart, seconds)
     ends = Ends(job.start, job.goal)
@@ -197,14 +196,15 @@ def _notes(found: Solution, scenes: Sequence[Scene], options: PlanOptions) -> It
     for each in of_scenes[0]:
         if all(each in others for others in of_scenes):
             yield Caution(LEFT_OUT, each)
-    if not options.self_collision and found.status not in UNSEEN:
-        entered = self_collision_sentence(found.trajectory)
-        if entered:
-            yield Caution(COLLISION, entered)
-    if options.self_collision and problem is not None and problem.clearance is not None:
+    looked_for = not options.self_collision and found.status not in UNSEEN
+    if looked_for and (entered := self_collision_sentence(found.trajectory)):
+        yield Caution(COLLISION, entered)
+    if problem is None or problem.clearance is None:
+        return
+    if options.self_collision:
         for each in pairs_left_out(problem.robot, tuple(problem.clearance.may_touch)):
             yield Caution(WARNED, each)
-    for link, other, gap in () if problem is None else (problem.clearance or Clearance()).gaps:
+    for link, other, gap in problem.clearance.gaps:
         yield Caution(
             LEFT_OUT,
             f"{link!r} and {other!r} are {gap:.2g} m nearer than the margin at an end, and may be "

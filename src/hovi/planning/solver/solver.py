@@ -291,7 +291,7 @@ class _Again:
         stopped = None if unlimited else braking(problem)
         if stopped is None:
             return None
-        found = stopped.problem, stopped.path, problem.ld.action(stopped.path)
+        found = stopped.problem, stopped.path, cost_of(stopped.problem, stopped.path)
         result = MethodResult(*found, status, f"{message} {BRAKES}", steps, central=self.central)
         return dataclasses.replace(solution_of(result, 0.0, 0.0), check=self.check)
 

@@ -142,9 +142,9 @@ def meets(table: ShapedTable) -> bool:
 
 def _note(table: ShapedTable, robot: Robot, toml: TomlText) -> str:
     """What is assumed of a file of format 1 whose robot has collision shapes; "" for others."""
-    from hovi.planning.clearance.self_collisions import can_keep_apart  # 10 ms
+    from hovi.planning.clearance.self_collisions import can_keep_apart, names_shapes  # 10 ms
 
-    if not (meets(table) and "<collision" in (robot.source.urdf or "") and can_keep_apart(robot)):
+    if not (meets(table) and names_shapes(robot) and can_keep_apart(robot)):
         return ""
     return (
         f"{toml.path.name} has no `format`, so links may meet, as in format 1: write `format = "

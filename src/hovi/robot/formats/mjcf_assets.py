@@ -11,11 +11,9 @@ from hovi.errors import ModelError
 from hovi.robot.formats.mjcf_defaults import Compiler, Defaults, sections
 from hovi.robot.formats.mjcf_poses import rotation_of
 from hovi.robot.formats.mjcf_text import MjcfError, numbers
-from hovi.robot.meshes.reading import MESH_TYPES, triangles_in
+from hovi.robot.meshes.reading import MAX_MESH_BYTES, MESH_TYPES, triangles_in
 from hovi.robot.meshes.triangles import Triangles
 from hovi.system.files import reason, require_file
-
-MAX_MESH_BYTES = 256_000_000
 
 
 class Meshes:

@@ -42,7 +42,6 @@ SECTIONS = (
     "worldbody",
 )
 """The elements below the root."""
-LOOPS = "connect", "weld", "flex", "flexvert", "flexstrain"
 GRAVITY = [0.0, 0.0, -9.81]
 
 

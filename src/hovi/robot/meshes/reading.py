@@ -26,6 +26,8 @@ _READERS: dict[str, Callable[[bytes], Triangles]] = {
 }
 MESH_TYPES = tuple(_READERS)
 """Types of files that are read."""
+MAX_MESH_BYTES = 256_000_000
+"""Largest file."""
 
 
 def triangles_in(path: Path, content: bytes) -> Triangles:

@@ -13,10 +13,9 @@ from pathlib import Path
 from xml.parsers import expat
 
 from hovi.errors import ModelError
-from hovi.robot.meshes.reading import MESH_TYPES
+from hovi.robot.meshes.reading import MAX_MESH_BYTES, MESH_TYPES
 from hovi.system.files import reason, require_file
 
-MAX_MESH_BYTES = 256_000_000
 MAX_NAMED_BYTES = 64_000_000
 """Largest mesh, and largest texture or material library, in bytes."""
 

@@ -80,7 +80,7 @@ def states_too_far_apart(coordinates: Coordinates, stops: Sequence[Stop], limits
     pace = Pace.of(limits)
     states = [stop for stop in stops if isinstance(stop.goal, State)]
     for first, last in combinations(states, 2):
-        clause = _between_states(_Leg(first, last, coordinates, pace, limits))
+        clause = _between_states(Leg(first, last, coordinates, pace, limits))
         if clause:
             return clause
     return ""
@@ -104,7 +104,7 @@ def frame_too_far(robot: Robot, stops: Sequence[Stop], limits: Limits) -> Findin
 
 
 @dataclass(frozen=True, eq=False)
-class _Leg:
+class Leg:
     """A part of a motion between two stops."""
 
     first: Stop
@@ -125,17 +125,26 @@ class _Leg:
         return first.astype(np.intp) + last
 
     @property
+    def distance(self) -> Array:
+        """How far each joint has to move between two states, (nv,); 0 where an end is free."""
+        on = self.coordinates
+        (q0, held), (q1, also) = self.first.position(on), self.last.position(on)
+        return np.where(held & also, on.difference(q0, q1), 0.0)
+
+    @property
+    def needed(self) -> Array:
+        """The least time of each joint between two states, (nv,), in [s]."""
+        return self.pace.least_time(self.distance, self.rests)
+
+    @property
     def whole(self) -> bool:
         """Whether it is the whole motion."""
         return (self.first.name, self.last.name) == ("start", "goal")
 
 
-def _between_states(leg: _Leg) -> str:
+def _between_states(leg: Leg) -> str:
     """The joint that cannot travel its distance in time."""
-    on = leg.coordinates
-    (q0, held), (q1, also) = leg.first.position(on), leg.last.position(on)
-    distance = np.where(held & also, on.difference(q0, q1), 0.0)
-    needed = leg.pace.least_time(distance, leg.rests)
+    on, distance, needed = leg.coordinates, leg.distance, leg.needed
     i = int(np.argmax(needed))
     if needed[i] <= leg.time:
         return ""
@@ -155,7 +164,7 @@ def _between_states(leg: _Leg) -> str:
 
 
 @dataclass(frozen=True, eq=False)
-class _FrameLeg(_Leg):
+class _FrameLeg(Leg):
     """A part of a motion between a state and a frame at its goal."""
 
     coordinates: Robot

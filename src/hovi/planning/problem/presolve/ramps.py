@@ -14,7 +14,7 @@ import numpy.typing as npt
 from hovi.discrete.grid import Grid
 from hovi.discrete.state import State
 from hovi.planning.problem.presolve.least_time import Pace
-from hovi.planning.problem.presolve.legs import Stop
+from hovi.planning.problem.presolve.legs import Leg, Stop
 from hovi.planning.problem.problem import TrajectoryProblem
 
 Array = npt.NDArray[np.float64]
@@ -47,18 +47,14 @@ def _ramp_nodes(problem: TrajectoryProblem) -> Array:
     if not (isinstance(start, State) and isinstance(goal, State)):
         return np.zeros(0)
     on, T = problem.coordinates, problem.grid.duration
-    stops = Stop("start", 0.0, start), Stop("goal", T, goal)
-    (q0, held), (q1, also) = (stop.position(on) for stop in stops)
-    distance = np.where(held & also, on.difference(q0, q1), 0.0)
-    rests = [stop.rests(on) for stop in stops]
-    pace = Pace.of(limits)
-    needed = pace.least_time(distance, rests[0].astype(np.intp) + rests[1])
-    i = int(np.argmax(needed))
-    ends = [bool(each[i]) for each in rests]
-    if needed[i] < TIGHT * T or not any(ends):
+    leg = Leg(Stop("start", 0.0, start), Stop("goal", T, goal), on, Pace.of(limits), limits)
+    i = int(np.argmax(leg.needed))
+    ends = [bool(stop.rests(on)[i]) for stop in (leg.first, leg.last)]
+    if leg.needed[i] < TIGHT * T or not any(ends):
         return np.zeros(0)
-    speed = float((pace.up if distance[i] >= 0 else pace.down)[i])
-    ramp = 2.0 * (T - abs(float(distance[i])) / speed) / sum(ends)
+    distance = float(leg.distance[i])
+    speed = float((leg.pace.up if distance >= 0 else leg.pace.down)[i])
+    ramp = 2.0 * (T - abs(distance) / speed) / sum(ends)
     longest = float(problem.grid.steps.max())
     times = ramp * GRADES[(ramp * GRADES <= 2.0 * longest) | (GRADES <= 1.0)]
     times = times[times < T / 2]

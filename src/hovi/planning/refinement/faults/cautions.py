@@ -28,7 +28,7 @@ from hovi.planning.refinement.faults.on_curve import (
     has_own_curve,
     least_cost,
 )
-from hovi.planning.refinement.whirling import whirl
+from hovi.planning.refinement.whirling import whirl_without_limits
 from hovi.planning.solver.solver import Solution
 from hovi.system.deadline import OutOfTimeError
 
@@ -67,7 +67,7 @@ def _shown_by(solution: Solution) -> Iterator[Caution]:
         return
     try:
         yield from _of_grid(solution, problem)
-        yield from _of_speed(solution, problem)
+        yield from _of_speed(solution)
         yield from _of_limits(solution, problem)
     except (HoviError, OutOfTimeError):  # what cannot be sampled shows nothing
         return
@@ -93,9 +93,9 @@ def _of_grid(solution: Solution, problem: TrajectoryProblem) -> Iterator[Caution
     )
 
 
-def _of_speed(solution: Solution, problem: TrajectoryProblem) -> Iterator[Caution]:
+def _of_speed(solution: Solution) -> Iterator[Caution]:
     """The light joint that spins without a limit, if one does."""
-    spinning = None if problem.limited else whirl(solution)
+    spinning = whirl_without_limits(solution)
     if spinning is not None:
         yield Caution(
             SPINS,
@@ -107,7 +107,7 @@ def _of_speed(solution: Solution, problem: TrajectoryProblem) -> Iterator[Cautio
 
 def _of_limits(solution: Solution, problem: TrajectoryProblem) -> Iterator[Caution]:
     """The limits of the URDF that a motion without limits exceeds, a joint of each kind."""
-    if problem.limited or not problem.about_robot:
+    if problem.has_limits or not problem.about_robot:
         return
     limits = urdf_limits(problem.robot)
     excess = excess_along(solution.trajectory, limits, refined=False)

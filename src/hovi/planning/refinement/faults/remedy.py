@@ -21,6 +21,6 @@ def remedy(solution: Solution, reason: str) -> str:
         return (
             "use more intervals or a scheme with more modes, or name neither, so that plan chooses"
         )
-    limited = solution.problem is not None and solution.problem.limited
+    limited = solution.problem is not None and solution.problem.has_limits
     way = "try" if limited else "set limits or try"
     return f"{way} another initial guess, more starts or smooth"

@@ -43,8 +43,7 @@ def takes_rows(problem: TrajectoryProblem) -> bool:
     """
     if problem.distances is None or problem.clearance is None or problem.ld.chart is not None:
         return False
-    limited = problem.limits is not None and bool(problem.limits.bounded.any())
-    return limited or problem.clearance.self_collision
+    return problem.has_limits or problem.clearance.self_collision
 
 
 class InteriorPoint(Method):
@@ -101,7 +100,7 @@ class InteriorPoint(Method):
         if self.distances == "points":
             return rounds(problem, path, at_points)
         deadline = Deadline(options.time_limit)
-        if problem.limits is None or not problem.limits.bounded.any():
+        if not problem.has_limits:
             free = without_pairs(
                 partial(self._minimize, report=report), problem, path, options, report
             )

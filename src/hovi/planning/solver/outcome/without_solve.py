@@ -34,7 +34,7 @@ def unresolved_at_once(
         f"no motion was sought, since no grid would resolve it: {reason}; make what changes wider "
         "than that, or leave it out."
     )
-    value = problem.ld.action(path)
+    value = cost_of(problem, path)
     return solution_of(MethodResult(problem, path, value, Status.UNRESOLVED, message), 0.0, 0.0)
 
 
