@@ -56,6 +56,15 @@ def test_formulas_are_shown_as_they_are() -> None:
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)
+def test_a_parameter_is_listed_once(name: str) -> None:
+    function = getattr(hovi, name)
+    parameters = set(inspect.signature(function).parameters)
+    lines = as_rst(inspect.getdoc(function) or "", parameters, hovi.__all__)
+    heads = [line.split(": ")[0] for line in lines if line.startswith(":param")]
+    assert len(heads) == len(set(heads))
+
+
+@pytest.mark.parametrize("name", FUNCTIONS)
 def test_no_text_of_a_docstring_is_lost(name: str) -> None:
     function = getattr(hovi, name)
     doc = inspect.getdoc(function) or ""

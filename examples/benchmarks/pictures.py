@@ -115,8 +115,8 @@ def in_common_colors(frames: list[Image.Image]) -> list[Image.Image]:
 PICTURES: dict[str, Callable[[], None]] = {
     "first": lambda: moving(first_motion(), "first_motion.gif"),
     "swing": lambda: moving(swing_up(), "swing_up.gif", speed=2.0),
-    "desktop": lambda: still(DESKTOP, [planned("panda_reach_down")], "replay.png"),
-    "phone": lambda: still(PHONE, [planned("panda_reach_down")], "replay_phone.png", "names"),
+    "desktop": lambda: still(DESKTOP, [first_motion()], "replay.png"),
+    "phone": lambda: still(PHONE, [first_motion()], "replay_phone.png", "names"),
     "ghosts": lambda: still(
         DESKTOP,
         [planned("ur5_past_ball"), planned("ur5_past_ball", obstacles=())],

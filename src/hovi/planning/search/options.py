@@ -168,8 +168,8 @@ class PlanOptions:
     )
     smooth: bool = option(
         False,
-        "whether to add a cost on the jerk, with a weight that follows from the inertia and the "
-        "duration: accelerations are zero at both ends, or as given, and torques are continuous.",
+        "whether to add a cost on the jerk, whose weight follows from inertia and duration, so "
+        "that accelerations are zero at both ends, or as given, and torques are continuous.",
         SceneKey("true or false"),
     )
     group: str | None = option(

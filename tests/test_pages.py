@@ -1,0 +1,96 @@
+"""The code of the README and of every page of the docs runs as it stands there, in its order."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import tomlkit
+from tests.oracles.documents import NOT_RUN, PART, blocks, script
+
+import hovi
+
+TOP = Path(__file__).resolve().parents[1]
+HOWTOS = sorted((TOP / "docs" / "howto").glob("*.md"))
+PAGES = [TOP / "README.md", *sorted((TOP / "docs").glob("*.md")), *HOWTOS]
+TYPED = [page for page in PAGES if script(page)]
+MOST_MARKS = 12
+"""Blocks that may be left out."""
+
+
+@pytest.mark.parametrize("page", TYPED, ids=lambda page: page.stem)
+def test_the_code_of_a_page_runs(page: Path, tmp_path: Path) -> None:
+    """As one script, in a folder with the bundled models, and with hovi where the README has it."""
+    if page.stem == "video":
+        pytest.importorskip("imageio_ffmpeg")
+    (tmp_path / "models").symlink_to(TOP / "models")
+    (tmp_path / ".venv").symlink_to(sys.prefix)
+    file = tmp_path / "typed.py"
+    file.write_text(script(page))
+    path = {"PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"}
+    done = subprocess.run(
+        [sys.executable, file.name],
+        cwd=tmp_path,
+        env=os.environ | path,
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0, (done.stdout[-3000:], done.stderr[-3000:])
+
+
+@pytest.mark.parametrize(
+    "page", [page for page in PAGES if list(blocks(page))], ids=lambda p: p.stem
+)
+def test_the_tables_of_a_page_are_part_of_a_scene(page: Path, tmp_path: Path) -> None:
+    """They take the place of those of the bundled scene that a comment above them names."""
+    for block in blocks(page):
+        if block.language != "toml" or not block.runs:
+            continue
+        assert block.mark.startswith(PART), (page.name, block.code)
+        scene = hovi.example(block.mark.removeprefix(PART))
+        text = tomlkit.parse(scene.read_text())
+        for key, value in tomlkit.parse(block.code).items():
+            old = text.get(key)
+            if isinstance(old, dict) and key == "effects":
+                old.update(value)
+            else:
+                text[key] = value
+        file = tmp_path / scene.name
+        file.write_text(tomlkit.dumps(text))
+        hovi.load_task(file)
+
+
+def test_few_blocks_are_left_out_and_each_says_why() -> None:
+    marks = [block.mark for page in PAGES for block in blocks(page) if not block.runs]
+    assert len(marks) <= MOST_MARKS
+    assert all(mark.removeprefix(NOT_RUN) for mark in marks)
+
+
+def test_every_page_but_the_index_has_code() -> None:
+    assert [page.stem for page in HOWTOS if page not in TYPED] == ["index"]
+
+
+def test_every_page_is_in_the_index() -> None:
+    index = (TOP / "docs" / "howto" / "index.md").read_text()
+    for page in HOWTOS:
+        assert page.stem == "index" or f"({page.name})" in index
+
+
+def test_the_readme_begins_with_ten_lines_that_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    block = next(blocks(TOP / "README.md")).code
+    assert len(block.splitlines()) <= 10
+    names: dict[str, object] = {}
+    shown: list[object] = []
+    monkeypatch.setattr(hovi, "replay", shown.append)
+    exec(compile(block, "README.md", "exec"), names)
+    (motion,) = shown
+    assert isinstance(motion, hovi.Trajectory)
+    assert names["solution"].success  # type: ignore[attr-defined]
+
+
+def test_the_first_picture_is_small() -> None:
+    assert (TOP / "docs" / "images" / "first_motion.gif").stat().st_size < 1.5e6
