@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from hovi.cli.application import main
+from hovi.study.running.progress import StudyProgress
 from hovi.study.showing.charts import draw_against, draw_histograms, draw_map
 from hovi.study.showing.plans import Plans
 from hovi.study.showing.summary import summary
@@ -43,6 +45,39 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     code = main(["study", str(at / "study.toml"), "--out", str(at / "out"), "--workers", "1"])
     assert code == 0
     return at / "out"
+
+
+def test_plans_are_shown_while_a_study_runs(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    seen: list[str] = []
+
+    def look(state: StudyProgress) -> None:
+        if state.done and not seen:
+            assert main(["study", "show", str(tmp_path)]) == 0
+            seen.append(capsys.readouterr().out)
+
+    (tmp_path / "study.toml").write_text(STUDY)
+    study = Study.read(tmp_path / "study.toml")
+    assert study.run(tmp_path, progress=look).complete
+    assert "so far" in seen[0]
+    assert main(["study", "show", str(tmp_path)]) == 0
+    assert "so far" not in capsys.readouterr().out
+
+
+def test_plans_of_a_run_that_was_killed_are_shown(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    killed = tmp_path / "killed"
+    shutil.copytree(folder, killed, ignore=shutil.ignore_patterns("*.parquet"))
+    assert main(["study", "show", str(killed), "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert (told["plans"], told["success"], told["finished"]) == (18, 9, False)
+    assert main(["study", "motion", str(killed), "0", "--out", str(tmp_path / "m.npz")]) == 2
+    assert "when its run has ended" in capsys.readouterr().err
+    shutil.rmtree(killed / "journal")
+    assert main(["study", "show", str(killed)]) == 2
+    assert "run the study first" in capsys.readouterr().err
 
 
 def test_the_command_tells_failures_and_resumes(

@@ -145,6 +145,8 @@ def motion(
 
     check_output(out, ".npz")
     plans = Plans.read(folder)
+    if not plans.finished:
+        raise InputError(f"the cells of {folder} are numbered when its run has ended.")
     if cell not in plans.columns["cell"]:
         raise InputError(f"the study in {folder} has no plan of cell {cell}.")
     key = plans.columns["key"][plans.columns["cell"].index(cell)]

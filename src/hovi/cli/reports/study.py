@@ -78,6 +78,8 @@ def print_summary(found: dict[str, Any], as_json: bool) -> None:
         print(json.dumps(finite(found), allow_nan=False))
         return
     print(f"plans    {found['plans']:,}, of which {found['success']:,} are minima")
+    if not found["finished"]:
+        print(f"{'':9s}so far: the run goes on, or was ended; start it again for the rest")
     for status, number in found["status"].items():
         print(f"{'':9s}{number:,} {status}")
     for word, number in found["cautions"].items():
@@ -89,8 +91,9 @@ def print_summary(found: dict[str, Any], as_json: bool) -> None:
     quantiles = found["quantiles"].items()
     print_table(columns, [(name, *(f"{x:.4g}" for x in values)) for name, values in quantiles])
     for each in found["worst"][:3]:
-        given = ", ".join(f"{k} = {_shown(v)}" for k, v in each["parameters"].items())
-        print(f"worst    cell {each['cell']}: cost {each['cost']:.6g}, {given[:WIDTH]}")
+        given = "".join(f", {k} = {_shown(v)}" for k, v in each["parameters"].items())
+        which = f"key {each['key']}" if each["cell"] is None else f"cell {each['cell']}"
+        print(f"worst    {which}: cost {each['cost']:.6g}{given[:WIDTH]}")
 
 
 def _shown(value: Any) -> str:

@@ -1,8 +1,9 @@
-"""plans.parquet and runs.parquet, read to be shown."""
+"""plans.parquet and runs.parquet, or what the journals have so far, read to be shown."""
 
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -11,8 +12,12 @@ import numpy.typing as npt
 
 from hovi.errors import InputError, StudyError, nearest
 from hovi.study.cells.extras import require_extra
+from hovi.study.storage.folder import in_use
+from hovi.study.storage.index import Index
+from hovi.study.storage.rows import PlanRow
 from hovi.study.storage.tables import PLANS, RUNS, read_table
 from hovi.system.dataclass import dataclass
+from hovi.system.files import names_file
 
 Array = npt.NDArray[np.float64]
 
@@ -23,17 +28,23 @@ class Plans:
 
     folder: of the study. columns: of plans.parquet, by name, as lists. parameters: names of those
     that vary. seconds: that each plan took, by key; of the last run that did it.
+    finished: False for plans of a run that goes on or was killed, whose cells are not known.
     """
 
     folder: Path
     columns: dict[str, list[Any]]
     parameters: tuple[str, ...]
     seconds: dict[str, float]
+    finished: bool = True
 
     @classmethod
     def read(cls, folder: Path) -> Plans:
-        """The plans of a folder. Raises StudyError."""
+        """The plans of a folder, those so far where its run has not ended. Raises StudyError."""
         require_extra("pyarrow", "study")
+        if in_use(folder) or not names_file(folder / PLANS):
+            index = Index(folder)
+            if index.read_new():
+                return cls._so_far(folder, index)
         table = read_table(folder / PLANS).to_pydict()
         names = list(table)
         if "key" not in names or "status" not in names:
@@ -42,6 +53,17 @@ class Plans:
         runs = read_table(folder / RUNS).to_pydict()
         taken = zip(runs["key"], runs["seconds"], strict=True)
         return cls(folder, table, parameters, {k: s for k, s in taken if s is not None})
+
+    @classmethod
+    def _so_far(cls, folder: Path, index: Index) -> Plans:
+        """The plans of the journals, without the parameters of their cells."""
+        keys = index.keys()
+        done = {key: index.done(key) for key in keys}
+        rows = [each.row.to_dict() for each in done.values() if each is not None]
+        columns = {each.name: [row[each.name] for row in rows] for each in fields(PlanRow)}
+        columns |= {"key": list(done), "cell": [None] * len(rows)}
+        taken = {run["key"]: run["seconds"] for run in index.runs() if run.get("seconds")}
+        return cls(folder, columns, (), taken, finished=False)
 
     def __len__(self) -> int:
         return len(self.columns["key"])

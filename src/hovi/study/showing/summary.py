@@ -14,7 +14,10 @@ SHOWN = ("cost", "error_estimate", "nit", "margin", "least_distance", "seconds")
 
 
 def summary(plans: Plans) -> dict[str, Any]:
-    """JSON-compatible data: counts by status and caution, quantiles of columns of minima."""
+    """JSON-compatible data: counts by status and caution, quantiles of columns of minima.
+
+    finished is False where there are the plans of a run that goes on or was killed.
+    """
     success = plans.success
     quantiles = {}
     for name in SHOWN:
@@ -24,6 +27,7 @@ def summary(plans: Plans) -> dict[str, Any]:
             quantiles[name] = [float(x) for x in np.quantile(values, QUANTILES)]
     return {
         "plans": len(plans),
+        "finished": plans.finished,
         "success": int(success.sum()),
         "status": plans.by_status(),
         "cautions": plans.by_caution(),
