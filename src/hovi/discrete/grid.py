@@ -196,24 +196,29 @@ class Grid(Summarized):
             )
         return k
 
-    def with_nodes(self, times: Sequence[float]) -> Grid:
+    def with_nodes(self, times: Sequence[float], halved: bool = False) -> Grid:
         """The grid with the nearest inner nodes moved to given times, in [s], ascending.
 
         The intervals between two moved nodes keep the proportions of their lengths.
+        halved: whether intervals are halved until there are enough of them.
         Raises InputError if the grid has too few nodes.
         """
-        nodes = self.t
-        fixed, times = [0], list(dict.fromkeys(times))
-        for time in times:
+        nodes, times = self.t, list(dict.fromkeys(times))
+        if not times:
+            return self
+        if len(times) >= self.intervals:
+            if halved:
+                return self.halved().with_nodes(times, halved)
+            raise InputError(
+                f"{len(times)} times between the ends of a motion need {len(times) + 1} intervals "
+                f"or more, got {self.intervals}."
+            )
+        fixed = [0]
+        for rest, time in zip(range(len(times), 0, -1), times, strict=True):
             if not 0 < time < self.duration:
                 raise InputError(outside_motion(time, self.duration))
-            k = int(np.clip(np.argmin(np.abs(nodes - time)), fixed[-1] + 1, self.intervals))
-            if k >= self.intervals:
-                raise InputError(
-                    f"a via point at {time:g} s does not fit between its neighbors on "
-                    f"{self.intervals} intervals of {self.duration:g} s; use more intervals."
-                )
-            fixed.append(k)
+            nearest = np.argmin(np.abs(nodes - time))
+            fixed.append(int(np.clip(nearest, fixed[-1] + 1, self.intervals - rest)))
         targets = [0.0, *times, self.duration]
         t = np.interp(nodes, nodes[[*fixed, self.intervals]], targets)
         return Grid(np.diff(t), self.schemes)

@@ -358,7 +358,7 @@ def _grid(T: float, options: PlanOptions, scene: Scene, free: bool) -> Grid:
         few = options.starts == 1 and not free and not isinstance(guess, Trajectory)
         number, order = options.interval_count, scene.order
         grid = first_grid(T, number, not kinks, more_points=not few, order=order)
-    return grid.with_nodes(sorted(each.time for each in options.via)) if options.via else grid
+    return grid.with_nodes(sorted(each.time for each in options.via), options.intervals is None)
 
 
 def _is_first_grid(grid: Grid, options: PlanOptions, order: int) -> bool:

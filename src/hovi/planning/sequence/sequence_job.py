@@ -68,7 +68,8 @@ def job_of(
     if any(each.limits is not None for each in segments):
         job = job.with_options(limits=Limits.of_segments(limits, ends[:-1]))
     job = job.with_options(via=(*seams, *options.via))
-    job = job.on(grid.with_nodes(job.node_times)) if options.via else job
+    if options.via:
+        job = job.on(grid.with_nodes(job.node_times, options.intervals is None))
     return job.on(job.graded(job.grid))
 
 
