@@ -6,6 +6,7 @@ Every message says in one or two sentences what was expected, what was found and
 from __future__ import annotations
 
 import difflib
+import os
 import re
 import sys
 import warnings
@@ -79,6 +80,14 @@ class UnmeasurableError(HoviError):
 
 class DisplayError(HoviError):
     """A figure, a page or a viewer cannot be created."""
+
+
+def shows_all_frames() -> bool:
+    """Whether errors keep all frames of hovi in their tracebacks, for who works on hovi.
+
+    Otherwise one is left, that of the public function, below the line that called it.
+    """
+    return os.environ.get("HOVI_TRACEBACK") == "full"
 
 
 class HoviWarning(UserWarning):

@@ -1,7 +1,8 @@
 """Arguments of public functions, checked against their annotations.
 
 Misuse is refused before anything is computed, in one sentence: the argument, what it must be, and
-what was given. Shapes and values are checked by each function itself.
+what was given. Shapes and values are checked by each function itself. A HoviError leaves such a
+function without the frames below it, which say nothing to who called it: see `shows_all_frames`.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any, TypeVar, cast
 
 from hovi.checks.kinds import Kind, MismatchError, kind_of, resolved
-from hovi.errors import HoviError, InputError
+from hovi.errors import HoviError, InputError, shows_all_frames
 from hovi.system.dataclass import dataclass
 
 Accept = Callable[[Any], Any]
@@ -33,6 +34,7 @@ def check_arguments(checked: Checked) -> Checked:
 
     checked: a function; or a class, whose constructor and public methods are checked unless they
         have a decorator of their own.
+    Errors of hovi leave it with its own frame alone, and without a cause.
     """
     return check_arguments_except()(checked)
 
@@ -85,13 +87,18 @@ def _checking(checked: Checked, names: Collection[str]) -> Checked:
         accepted: Sequence[Any] = args
         named = kwargs
         try:
-            accepts = known.accepts if len(args) <= len(known.accepts) else known.repeated(args)
-            accepted = [accept(value) for accept, value in zip(accepts, args)]  # noqa: B905 - speed
-            for name in kwargs:
-                named[name] = known.named.get(name, _anything)(kwargs[name])
-        except MismatchError:
-            known.refuse(args, kwargs)
-        return checked(*accepted, **named)
+            try:
+                accepts = known.accepts if len(args) <= len(known.accepts) else known.repeated(args)
+                accepted = [accept(x) for accept, x in zip(accepts, args)]  # noqa: B905 - speed
+                for name in kwargs:
+                    named[name] = known.named.get(name, _anything)(kwargs[name])
+            except MismatchError:
+                known.refuse(args, kwargs)
+            return checked(*accepted, **named)
+        except HoviError as refused:
+            if shows_all_frames():
+                raise
+            raise refused.with_traceback(None) from None  # HOVI_TRACEBACK=full shows all frames
 
     setattr(checking, _MARK, True)
     return checking  # type: ignore[return-value]

@@ -12,7 +12,7 @@ import casadi as ca
 import numpy as np
 import numpy.typing as npt
 
-from hovi.checks.arguments import check_fields
+from hovi.checks.arguments import check_arguments, check_fields
 from hovi.effects.expressions.symbols import SceneSymbols
 from hovi.errors import SceneError
 from hovi.system.dataclass import dataclass
@@ -47,6 +47,7 @@ class Effect(ABC):
     storable: ClassVar[bool] = True
     """Whether its fields are data that files contain."""
 
+    @check_arguments
     def __post_init__(self) -> None:
         """Convert lists to tuples, so that effects read from a file equal those written.
 

@@ -164,6 +164,7 @@ class Grasped:
         return {**known, "shape": shapes if len(shapes) > 1 else shapes[0]}
 
 
+@check_arguments_except("robot", "grasped")
 def holding(
     robot: Robot, grasped: Grasped | Mapping[str, Any] | Sequence[Grasped | Mapping[str, Any]]
 ) -> Robot:

@@ -62,8 +62,8 @@ def _check_names(owner: type[Owner]) -> type[Owner]:
     return owner
 
 
-@_check_names
 @check_arguments
+@_check_names
 @dataclass(frozen=True, eq=False)
 class FrameGoal:
     """A target pose, position, orientation or axis direction of a frame of the robot.
