@@ -117,10 +117,12 @@ class Search:
     def _with_ramps(self, explored: Exploration) -> Job | None:
         """The job with nodes where joints that are pressed for time speed up and slow down.
 
-        None if the motion on this grid is not infeasible, if the grid is given, or if it has them.
+        None if the motion on this grid is not infeasible, or if it has them. A grid that is given
+        gets them, too, since limits split its intervals in any case.
         """
-        fine, infeasible = self.fine, explored.minima[0].status is Status.INFEASIBLE
-        if not infeasible or fine.tolerance is None or self.free is not None or interrupted():
+        fine, found = self.fine, explored.minima[0]
+        infeasible = found.status is Status.INFEASIBLE and found.nit > 0  # not by a contradiction
+        if not infeasible or self.free is not None or interrupted():
             return None
         grid = graded_to_ramps(fine.problem())
         return None if grid.intervals == fine.grid.intervals else fine.on(grid)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hovi.planning.problem.limits import Limits
-from hovi.planning.problem.presolve.least_time import Pace
+from hovi.planning.problem.presolve.least_time import Pace, fastest
 
 INF = np.inf
 PACES = [(2.0, 5.0), (2.0, INF), (INF, 5.0), (0.3, 40.0), (30.0, 0.7)]
@@ -55,3 +55,25 @@ def test_unlimited_joints_take_no_time_and_others_their_tolerance() -> None:
     pace = Pace.of(Limits(lower, upper, 0.01))
     assert pace.least_time(np.array([3.0, 7.0]), np.array([2, 2])) == pytest.approx([3 / 2.03, 0])
     assert pace.least_time(np.array([-3.0, 0.0]), np.array([2, 2])) == pytest.approx([3 / 1.03, 0])
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_the_fastest_travel_between_velocities_has_its_distance(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    V, A = rng.uniform(0.3, 3.0, 2)
+    u, w = rng.uniform(-V, V, 2)
+    d = rng.uniform(-4.0, 4.0)
+    time, peak = fastest(d, (u, w), (V, V), A)
+    t, sign = np.linspace(0.0, time, 200_001), np.sign(peak)
+    velocity = np.minimum(sign * u + A * t, sign * w + A * (time - t))
+    assert np.trapezoid(np.minimum(velocity, V), t) == pytest.approx(sign * d, abs=1e-7)
+    assert velocity.max() >= abs(peak) * (1 - 1e-4)
+    assert fastest(-d, (-u, -w), (V, V), A) == pytest.approx((time, -peak))
+
+
+def test_the_fastest_travel_between_ends_at_rest_takes_the_least_time() -> None:
+    speed, acceleration = np.array(PACES).T
+    least = Pace(speed, speed, acceleration).least_time(np.full(len(PACES), 0.9), np.array(2))
+    for i, (v, a) in enumerate(PACES):
+        assert fastest(0.9, (0.0, 0.0), (v, v), a)[0] == pytest.approx(least[i])
+        assert fastest(-0.9, (np.nan, np.nan), (v, v), a)[0] == pytest.approx(0.9 / v)

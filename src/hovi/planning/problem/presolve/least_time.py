@@ -65,3 +65,46 @@ class Pace:
             cruising = far / speed + np.where(ramps > 0, ramps * speed, 0.0)
             is_cruising = (ramps == 0) | (far > ramps * speed**2)
         return np.where(is_cruising, cruising, 2 * np.sqrt(ramps * far))
+
+
+def fastest(
+    distance: float,
+    velocities: tuple[float, float],
+    speeds: tuple[float, float],
+    acceleration: float,
+) -> tuple[float, float]:
+    """The least time of a travel between two velocities, in [s], and its peak velocity.
+
+    The joint speeds up to the peak p and slows down, at its speed limit between if it reaches it:
+
+        p^2 = (2 a d + u_0^2 + u_1^2) / 2  for d > 0.
+
+    distance: d. velocities: u_0 and u_1; NaN where free, which are p. speeds: the largest, down and
+        up. acceleration: a, the largest; infinite without a limit, as the time may be.
+    """
+    found = [
+        _fastest(side * distance, [side * u for u in velocities], speed, acceleration)
+        for side, speed in zip((-1, 1), speeds, strict=True)
+    ]
+    (down, low), (up, high) = found
+    return (up, high) if up <= down else (down, -low)
+
+
+def _fastest(
+    distance: float, velocities: list[float], speed: float, acceleration: float
+) -> tuple[float, float]:
+    """As `fastest`, of a travel that first goes up; infinite where it has to go down first."""
+    given = np.array([u for u in velocities if not np.isnan(u)])
+    peak = speed
+    if len(given) > 0 and np.isfinite(acceleration):
+        squares = float(2 * acceleration * distance + given @ given) / len(given)
+        peak = min(speed, float(np.sqrt(squares))) if squares >= 0 else -np.inf
+    elif distance < 0:
+        return np.inf, peak
+    if peak < given.max(initial=0.0):
+        return np.inf, peak
+    if np.isinf(peak):
+        return 0.0, peak
+    ramps = float((peak - given).sum()) / acceleration
+    cruising = distance - float((peak**2 - given**2).sum()) / (2 * acceleration)
+    return ramps + max(cruising, 0.0) / max(peak, NONE), peak

@@ -1,62 +1,112 @@
-"""Nodes for the ramps of a motion that has little more than its least time.
+"""Nodes for the ramps of motions that have little more than their least time.
 
-A joint that travels a distance d in a time T within |v| <= v_max is at full speed for at least
-d / v_max. What is left, s = T - d / v_max, is for its ramps: each takes s if it is linear and the
-joint rests at both ends, 2 s at the only one. Limits are kept by polynomials on intervals, and on
-one that is longer than a ramp none is steep enough.
+A joint that travels a distance d in a time T, from a velocity u_0 to a velocity u_1 and at most at
+p between, is at p for all of the time but its ramps. If both have one acceleration, they take
+
+    r_e = (p - u_e) / a,  a = ((p - u_0)^2 + (p - u_1)^2) / (2 (p T - d)).
+
+Limits are kept by polynomials on intervals, and on one that is longer than a ramp none is steep
+enough.
 """
 
 from __future__ import annotations
+
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
 
 from hovi.discrete.grid import Grid
 from hovi.discrete.state import State
-from hovi.planning.problem.presolve.least_time import Pace
+from hovi.planning.problem.presolve.least_time import NONE, Pace, fastest
 from hovi.planning.problem.presolve.legs import Leg, Stop
 from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.robot.space.coordinates import Coordinates
 
 Array = npt.NDArray[np.float64]
 
 TIGHT = 0.8
-"""Least share of the duration that a joint's least time takes where its ramps get nodes."""
+"""Least share of its time that the least time of a travel takes where its ramps get nodes."""
 GRADES = 2.0 ** np.arange(-2, 12)
 """Times of nodes, as multiples of a ramp, until they are as far apart as those of the grid."""
+SMOOTH_GRADES = np.union1d(2.0 ** np.arange(-3, 12), [0.75, 0.875])
+"""The same where the acceleration is continuous, and has to vanish after a ramp as well."""
 CLOSE = 1e-6
 """Share of the duration within which two nodes are one."""
+ENDS = "start", "goal"
+"""Names of the ends of a motion."""
+NEAR = 0.1
+"""The same for nodes of ramps of different joints, as a share of their time from the stop."""
 
 
 def graded_to_ramps(problem: TrajectoryProblem) -> Grid:
-    """The grid of a problem with further nodes in the ramps of the joint with the least to spare.
+    """The grid of a problem with further nodes in the ramps of all joints with little to spare.
 
-    The same grid where no joint is pressed for time, and for motions that are not between two
-    states without via points.
+    The same grid where no joint is pressed for time. Ramps at frames are not known.
     """
-    grid, T = problem.grid, problem.grid.duration
-    times = _ramp_nodes(problem)
-    apart = np.abs(times[:, None] - grid.t).min(axis=1) > CLOSE * T
-    return grid.split_at(np.union1d(grid.t, times[apart]))
+    grid, limits = problem.grid, problem.limits
+    if limits is None or not limits.bounded[1:3].any():
+        return grid
+    nodes = np.zeros(0)
+    grades = np.asarray(GRADES if problem.ld.k < 3 else SMOOTH_GRADES, dtype=float)
+    for leg in _legs(problem):
+        times = _ramp_nodes(leg, grades, float(grid.steps.max()))
+        nodes = np.union1d(nodes, leg.first.time + times)
+    nodes = nodes[np.diff(nodes, prepend=-np.inf) > CLOSE * grid.duration]
+    apart = np.abs(nodes[:, None] - grid.t).min(axis=1, initial=np.inf) > CLOSE * grid.duration
+    return grid.split_at(np.union1d(grid.t, nodes[apart]))
 
 
-def _ramp_nodes(problem: TrajectoryProblem) -> Array:
-    """Times of nodes from both ends on, in [s]; none where no joint is pressed for time."""
-    limits, start, goal = problem.limits, problem.start, problem.goal
-    if limits is None or limits.parts or problem.via or not limits.bounded[1].any():
-        return np.zeros(0)
-    if not (isinstance(start, State) and isinstance(goal, State)):
-        return np.zeros(0)
-    on, T = problem.coordinates, problem.grid.duration
-    leg = Leg(Stop("start", 0.0, start), Stop("goal", T, goal), on, Pace.of(limits), limits)
-    i = int(np.argmax(leg.needed))
-    ends = [bool(stop.rests(on)[i]) for stop in (leg.first, leg.last)]
-    if leg.needed[i] < TIGHT * T or not any(ends):
-        return np.zeros(0)
-    distance = float(leg.distance[i])
-    speed = float((leg.pace.up if distance >= 0 else leg.pace.down)[i])
-    ramp = 2.0 * (T - abs(distance) / speed) / sum(ends)
-    longest = float(problem.grid.steps.max())
-    times = ramp * GRADES[(ramp * GRADES <= 2.0 * longest) | (GRADES <= 1.0)]
-    times = times[times < T / 2]
-    sides = [times if ends[0] else times[:0], T - times if ends[1] else times[:0]]
-    return np.concatenate(sides)
+def _legs(problem: TrajectoryProblem) -> list[Leg]:
+    """The parts of the motion between neighboring states, with the limits there."""
+    limits, on, T = problem.limits, problem.coordinates, problem.grid.duration
+    ends = [(ENDS[0], 0.0, problem.start), (ENDS[1], T, problem.goal)]
+    given = [*ends, *(("via point", via.time, via.goal) for via in problem.via)]
+    stops = [Stop(name, t, x) for name, t, x in given if isinstance(x, State)]
+    assert limits is not None
+    return [
+        Leg(first, last, on, Pace.of(limits.until(last.time)), limits)
+        for first, last in pairwise(sorted(stops, key=lambda stop: stop.time))
+    ]
+
+
+def _ramp_nodes(leg: Leg, grades: Array, longest: float) -> Array:
+    """Times of nodes in a leg, from its beginning on, in [s]; none where no joint is pressed.
+
+    longest: step of the grid, in [s].
+    """
+    on, sides = leg.coordinates, [np.zeros(0), np.zeros(0)]
+    first, last = (_velocities(stop, on) for stop in (leg.first, leg.last))
+    for i, distance in enumerate(leg.distance):
+        for side, ramp in enumerate(_ramps(leg, i, float(distance), (first[i], last[i]))):
+            times = ramp * grades[(ramp * grades <= 2.0 * longest) | (grades <= 1.0)]
+            known = sides[side]
+            apart = np.abs(times[:, None] - known).min(axis=1, initial=np.inf) > NEAR * times
+            sides[side] = np.append(known, times[apart & (times < leg.time)])
+    return np.concatenate([sides[0], leg.time - sides[1]])
+
+
+def _velocities(stop: Stop, on: Coordinates) -> Array:
+    """Those of the joints at a stop, (nv,); NaN where they are free at an end of the motion.
+
+    At free ones on the way joints may turn round, and so have ramps as at rest.
+    """
+    assert isinstance(stop.goal, State)
+    ends = stop.name in ENDS
+    free = stop.goal.free_on(on, stop.name)[1]
+    return np.where(free, np.nan if ends else 0.0, stop.goal.on(on, stop.name)[1])
+
+
+def _ramps(leg: Leg, i: int, distance: float, velocities: tuple[float, float]) -> Array:
+    """How long a joint speeds up and slows down at most, (2,), in [s]; 0 where it is not pressed.
+
+    velocities: at its ends, NaN where free.
+    """
+    pace = leg.pace
+    speeds = float(pace.down[i]), float(pace.up[i])
+    needed, peak = fastest(distance, velocities, speeds, float(pace.acceleration[i]))
+    if needed < TIGHT * leg.time:
+        return np.zeros(2)
+    changes = np.nan_to_num(np.abs(peak - np.array(velocities)))
+    spare = max(abs(peak) * leg.time - np.sign(peak) * distance, 0.0)
+    return np.asarray(2.0 * spare * changes / max(float(changes @ changes), NONE))
