@@ -86,6 +86,21 @@ def test_numbers_are_those_of_the_plan(rows: list[dict[str, Any]], folder: Path,
     np.testing.assert_allclose(row["q_start"], solution.trajectory.q[0])
     np.testing.assert_allclose(row["q_goal"], solution.trajectory.q[-1])
     assert row["cautions"] is not None
+    assert row["excused"] == []
+
+
+def test_what_a_start_exceeds_is_in_its_row(tmp_path: Path) -> None:
+    scene = SCENE.replace("start.q = [-1.0]", "start = { q = [-1.0], v = [3.61] }")
+    (tmp_path / "scene.toml").write_text(scene)
+    (tmp_path / "ball.urdf").write_text(ROBOT)
+    study = hovi.Study(tmp_path / "scene.toml", [{"field": "duration", "values": [1.2]}])
+    study.run(tmp_path / "out")
+    (row,) = pq.read_table(tmp_path / "out" / "plans.parquet").to_pylist()
+    assert row["success"], row["reason"]
+    task = hovi.load_task(tmp_path / "scene.toml")
+    excused = hovi.plan(task.scene, task.start, task.goal, 1.2, options=task.options).excused
+    assert row["excused"] == [str(each) for each in excused]
+    assert "'hinge' by up to 0.01 until" in row["excused"][0]
 
 
 @pytest.mark.parametrize("cell", [0, 1])

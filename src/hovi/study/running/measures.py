@@ -39,6 +39,7 @@ def row_of(solution: Solution, warned: str, seconds: float, limit: float | None)
         reason=solution.message,
         warnings=warned,
         cautions=caution_lines([motion.metadata]),
+        excused=[str(each) for each in solution.excused],
         cost=_finite(solution.cost),
         effort=_finite(solution.effort),
         error_estimate=_finite(solution.error_estimate),

@@ -18,7 +18,8 @@ class PlanRow:
 
     status: of the Solution, or one of the words above. success, reason: of the Solution.
     warnings: what was warned of, in one text. cautions: of the motion, each after its word and a
-        colon; None of a plan by an earlier version.
+        colon; None of a plan by an earlier version. excused: which limits the start exceeds, each
+        as a text; None likewise.
     cost, effort, error_estimate, nit, n_neg: of the Solution.
     duration: of the motion, in [s]. intervals: of its grid.
     peak_v, peak_a, peak_tau: largest |v|, |a| and |tau| of each joint.
@@ -35,6 +36,7 @@ class PlanRow:
     reason: str = ""
     warnings: str = ""
     cautions: list[str] | None = None
+    excused: list[str] | None = None
     cost: float | None = None
     effort: float | None = None
     error_estimate: float | None = None
@@ -60,5 +62,5 @@ class PlanRow:
     @classmethod
     def from_dict(cls, data: Any) -> Self:
         """From JSON. Raises TypeError or KeyError for anything else."""
-        known = {"cautions": None} | data
+        known = {"cautions": None, "excused": None} | data
         return cls(**{each.name: known[each.name] for each in fields(cls)})

@@ -114,7 +114,7 @@ def plan_schema(cells: Cells) -> pa.Schema:
             pa.field("success", pa.bool_()),
             pa.field("reason", pa.string()),
             pa.field("warnings", pa.string()),
-            pa.field("cautions", pa.list_(pa.string())),
+            *(pa.field(name, pa.list_(pa.string())) for name in ("cautions", "excused")),
             *(pa.field(name, pa.float64()) for name in ("cost", "effort", "error_estimate")),
             *(pa.field(name, pa.int64()) for name in ("nit", "n_neg")),
             pa.field("motion_duration", pa.float64()),
