@@ -16,6 +16,7 @@ import numpy.typing as npt
 import pytest
 
 import hovi
+from hovi.errors import InputError
 
 Array = npt.NDArray[np.float64]
 KINDS = ("q", "v", "a", "tau")
@@ -202,3 +203,32 @@ def test_the_file_of_a_motion_keeps_what_its_margins_need(ball: hovi.Scene, tmp_
     solution.trajectory.save(tmp_path / "motion.npz")
     again = hovi.Trajectory.load(tmp_path / "motion.npz")
     assert again.metadata["clearance"] == solution.trajectory.metadata["clearance"]
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_success_and_usable_do_not_differ(arm_scene: hovi.Scene, seed: int) -> None:
+    """Between random ends, of which most are at a bound, or beyond, with derivatives either way."""
+    rng, planned = np.random.default_rng(seed), 0
+    for _ in range(20):
+        most = float(rng.choice([1.0, 3.0]))
+        limits: dict[str, Any] = {"q": 1.0, "v": most}
+        if rng.random() < 0.4:
+            limits["a"] = float(rng.choice([5.0, 20.0]))
+        ends = [_end_at_a_bound(rng, most) for _ in range(2)]
+        try:
+            found = hovi.plan(arm_scene, *ends, float(rng.choice([0.3, 1.0, 3.0])), limits=limits)
+        except InputError:
+            continue
+        planned += 1
+        assert found.success == found.usable, found.message
+    assert planned > 15
+
+
+def _end_at_a_bound(rng: np.random.Generator, most: float) -> hovi.State:
+    q, v, joint = rng.uniform(-1.0, 1.0, 2), np.zeros(2), rng.integers(2)
+    if rng.random() < 0.6:
+        q[joint] = rng.choice([-1.0, 1.0]) * (1.0 + rng.choice([0.0, 0.0, 1e-7, 1e-5, 1e-3]))
+        v[joint] = rng.choice([0.0, 1.0, -1.0]) * rng.choice([1e-6, 1e-3, 0.3, 1.0])
+    elif rng.random() < 0.5:
+        v[joint] = most * rng.choice([-1.0, 1.0]) * (1.0 + rng.choice([0.0, 1e-7, 1e-4]))
+    return hovi.State(q, v)

@@ -46,9 +46,14 @@ class SolutionSummary(Summarized):
     def violation(self) -> str:
         """What the motion violates of its ends, limits, distances and equations, "" if nothing.
 
-        A clause about the first that does not hold to 1e-6. InputError without a problem.
+        A clause about the first that does not hold to 1e-6. What no motion meets, such as a goal at
+        a bound that is reached from beyond it, the motion that is returned does not meet either.
+        InputError without a problem.
         """
-        return violation_of(self._solved_problem, self.trajectory)
+        violated = violation_of(self._solved_problem, self.trajectory)
+        if not violated and self.status is Status.INFEASIBLE:
+            return self.message.removesuffix(".")
+        return violated
 
     @property
     def usable(self) -> bool:
