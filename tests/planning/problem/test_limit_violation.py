@@ -25,6 +25,7 @@ from hovi.robot.loading import load_robot
 from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
 from hovi.schemes import galerkin
+from samples.cubic_motion import cubic_motion
 
 
 @pytest.fixture(scope="module")
@@ -91,6 +92,22 @@ def test_the_sentence_has_the_time_and_the_value_of_dense_sampling(
     assert float(said[1]) == pytest.approx(sign * values.max(), rel=1e-3)
     assert float(said[2]) == pytest.approx(t[np.argmax(values)], abs=2e-3)
     assert float(said[3]) == pytest.approx(sign * bound, rel=1e-3)
+
+
+def test_an_excess_between_samples_is_named_and_not_a_start_at_its_bound(
+    arm_scene: Scene, two_link: Robot
+) -> None:
+    """Of the samples, the start is the worst one: exactly at its bound, which it leaves inwards."""
+    motion, t = cubic_motion(arm_scene, seed=23)[0], np.linspace(0.0, 2.0, 100_001)
+    dense = motion.sample(t)
+    assert np.argmax(dense.q[:, 0]) == 0
+    peak = int(np.argmax(dense.v[:, 1]))
+    assert 0 < peak < len(t) - 1
+    upper = {"shoulder": [-10.0, float(motion.q[0, 0])]}
+    bound = float(dense.v[peak, 1]) - 1e-6
+    limits = as_limits(two_link, {"base": "none", "q": upper, "v": {"elbow": [-10.0, bound]}})
+    sentence = worst_sentence(motion, limits, two_link)
+    assert f"velocity of joint 'elbow' reaches {bound:.4g} rad/s at t = {t[peak]:.3g} s" in sentence
 
 
 def test_sliding_joints_are_measured_in_metres(panda: Robot) -> None:

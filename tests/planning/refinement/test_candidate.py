@@ -12,9 +12,10 @@ from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import Grid
 from hovi.discrete.measures.motion_error import deviation
 from hovi.discrete.state import State
+from hovi.effects.running_cost import RunningCost
 from hovi.planning.problem.limits import as_limits
 from hovi.planning.problem.problem import TrajectoryProblem
-from hovi.planning.problem.tolerance import Quantity, Tolerance
+from hovi.planning.problem.tolerance import CURVE_TOLERANCE, Quantity, Tolerance
 from hovi.planning.refinement.adaptive import refine_to_tolerance
 from hovi.planning.refinement.candidate import BARRIER_EXCESS, Candidate, error_of_cost
 from hovi.planning.refinement.error_estimate import (
@@ -38,6 +39,36 @@ def reach(
     ld = DiscreteLagrangian(scene.effort_lagrangian(), grid)
     bounds = None if limits is None else as_limits(scene.robot, limits)
     return TrajectoryProblem(ld, State(HANG), goal, bounds)
+
+
+# Narrow features
+
+
+@pytest.mark.parametrize(
+    ("narrow", "along", "carried"),
+    [
+        (False, 0.9 * CURVE_TOLERANCE, True),
+        (False, 1.1 * CURVE_TOLERANCE, False),
+        (True, 0.9e-6, True),
+        (True, 1.1e-6, False),
+        (True, 0.9 * CURVE_TOLERANCE, False),
+    ],
+)
+def test_where_effects_may_be_narrow_the_tolerance_holds_along_the_curve(
+    arm_scene: Scene, narrow: bool, along: float, carried: bool
+) -> None:
+    """Elsewhere the integral along the curve may differ by more than a tight tolerance."""
+    solution = solve_on_grid(reach(arm_scene, "galerkin-2", 8))
+    tight = Tolerance.of(1e-6, arm_scene.robot)
+    assert Candidate(solution, tight, along=along, narrow=narrow).is_carried == carried
+
+
+def test_effects_that_may_be_narrow_are_known_of_a_candidate(arm_scene: Scene) -> None:
+    pulse = RunningCost({"pulse": "exp(-((t - 0.5) / 0.01)**2)"})
+    pulsed = Scene(arm_scene.robot, [pulse])
+    for scene, narrow in ((arm_scene, False), (pulsed, True)):
+        solution = solve_on_grid(reach(scene, "galerkin-2", 8))
+        assert Candidate.of(solution, Tolerance.of(1e-3, scene.robot)).narrow == narrow
 
 
 # Limits

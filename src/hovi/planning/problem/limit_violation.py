@@ -256,20 +256,18 @@ def _may_exceed(excess: Array, tolerance: float) -> npt.NDArray[np.bool_]:
 
 
 def worst_sentence(trajectory: Trajectory, limits: Limits, coordinates: Coordinates) -> str:
-    """The limit that is exceeded most at the samples: kind, joint, time, value and bound."""
-    excess = excess_along(trajectory, limits, refined=False)
+    """The limit that is exceeded most anywhere: kind, joint, time, value and bound."""
+    excess = excess_along(trajectory, limits)
     above = excess.upper.max() >= excess.lower.max()
     side = excess.upper if above else excess.lower
     position = excess.at_upper if above else excess.at_lower
     k, kind, joint = np.unravel_index(int(np.argmax(side)), side.shape)
-    sample = np.searchsorted(POSITIONS, position[k, kind, joint])
+    s, sign = float(position[k, kind, joint]), 1 if above else -1
     bounds = limits.on(trajectory.t)[int(above)]
-    bounded = _Side(trajectory, limits, 1.0 if above else -1.0, bounds)
-    s = float(bounded.refined(*(np.array([each]) for each in (k, sample, kind, joint)))[1][0])
     value = _outputs(trajectory, np.array([k]), np.array([s]), limits)[0, kind, joint]
     bound = bounds[min(int(k), len(bounds) - 1), kind, joint]
     t = trajectory.t[k] + s * trajectory.grid.steps[k]
-    bound += bounded.sign * limits.wider(int(bounded.sign), np.array(t))[kind, joint]
+    bound += sign * limits.wider(sign, np.array(t))[kind, joint]
     unit = coordinates.coordinate_units[joint][kind]
     return (
         f"the {KIND_NAMES[KINDS[kind]]} of joint {coordinates.coordinate_names[joint]!r} reaches "
