@@ -52,9 +52,8 @@ def shown(motion: Trajectory) -> Iterator[Replay]:
 
 
 @pytest.fixture(scope="module")
-def tab(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Tab]:
-    profile = tmp_path_factory.mktemp("profile")
-    with headless_browser(profile, names="MAP other.test 127.0.0.1") as opened:
+def tab() -> Iterator[Tab]:
+    with headless_browser(names="MAP other.test 127.0.0.1") as opened:
         yield opened
 
 
@@ -81,9 +80,14 @@ def answer(shown: Replay, path: str, headers: dict[str, str], body: bytes = b"")
 def silent_browser(port: int) -> socket.socket:
     """A browser that asks for the messages and takes none of them."""
     browser = socket.create_connection(("127.0.0.1", port), timeout=60)
+    ask_for_messages(browser, port)
+    return browser
+
+
+def ask_for_messages(browser: socket.socket, port: int) -> None:
+    """Send the request of a browser for the messages."""
     lines = [f"{name}: {value}" for name, value in upgrade(f"127.0.0.1:{port}").items()]
     browser.sendall("\r\n".join(["GET / HTTP/1.1", *lines, "", ""]).encode())
-    return browser
 
 
 def rest_of(browser: socket.socket) -> bytes:
@@ -430,6 +434,29 @@ def test_closing_a_page_does_not_wait_for_browsers(
     for browser in browsers:
         browser.close()
     assert not [record for record in caplog.records if record.levelno > logging.DEBUG]
+
+
+def test_a_browser_that_joins_while_the_page_closes_is_disconnected(
+    motion: Trajectory, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Connected before, it asks for the messages once the others have left."""
+    with replay(motion, speed=100, announce=lambda address: None) as shown:
+        page = shown.page
+        assert isinstance(page, ServedPage)
+        late = socket.create_connection(("127.0.0.1", port_of(shown)), timeout=10)
+        until(lambda: page._server._open == 1)
+        close, port = page._server.close_all_connections, port_of(shown)
+
+        async def slowly() -> None:
+            ask_for_messages(late, port)
+            while not page._browsers:
+                await asyncio.sleep(0.01)
+            await close()
+
+        monkeypatch.setattr(page._server, "close_all_connections", slowly)
+    assert not page._browsers
+    rest_of(late)  # which is there until the server ends the connection
+    late.close()
 
 
 # The messages

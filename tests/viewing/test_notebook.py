@@ -148,7 +148,7 @@ def test_the_tutorial_runs_and_shows_tables_and_figures(converted: Path) -> None
 @needs_jupyter
 @pytest.mark.skipif(CHROMIUM is None, reason="no Chromium")
 def test_the_replay_plays_in_the_converted_tutorial(converted: Path, tmp_path: Path) -> None:
-    with headless_browser(tmp_path / "profile", (1000, 1200)) as tab:
+    with headless_browser((1000, 1200)) as tab:
         tab.call("Page.navigate", url=converted.as_uri())
         frame = "document.querySelector('iframe[srcdoc]')"
         tab.until(f"{frame} !== null")

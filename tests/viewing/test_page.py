@@ -67,12 +67,10 @@ def page(motion: Trajectory, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module", params=[DESKTOP, PHONE], ids=["desktop", "phone"])
-def tab(
-    request: pytest.FixtureRequest, page: Path, tmp_path_factory: pytest.TempPathFactory
-) -> Iterator[Tab]:
+def tab(request: pytest.FixtureRequest, page: Path) -> Iterator[Tab]:
     """The page in a window of each size."""
     width, height = request.param
-    with headless_browser(tmp_path_factory.mktemp("profile")) as opened:
+    with headless_browser() as opened:
         metrics = {"width": width, "height": height, "deviceScaleFactor": 1}
         opened.call("Emulation.setDeviceMetricsOverride", mobile=width < 500, **metrics)
         opened.open(page.as_uri())
@@ -82,9 +80,9 @@ def tab(
 
 
 @pytest.fixture(scope="module")
-def other_tab(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Tab]:
+def other_tab() -> Iterator[Tab]:
     """A window for other pages."""
-    with headless_browser(tmp_path_factory.mktemp("profile")) as opened:
+    with headless_browser() as opened:
         yield opened
 
 

@@ -63,8 +63,8 @@ def bare_motion(two_link: Robot) -> Trajectory:
 
 
 @pytest.fixture(scope="module")
-def tab(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Tab]:
-    with headless_browser(tmp_path_factory.mktemp("profile")) as opened:
+def tab() -> Iterator[Tab]:
+    with headless_browser() as opened:
         yield opened
 
 

@@ -84,9 +84,9 @@ class ServedPage(Page):
             self._loop.run_forever()
         finally:
             self._server.stop()
-            for browser in list(self._browsers):
-                browser.leave()
             self._loop.run_until_complete(self._server.close_all_connections())
+            for browser in list(self._browsers):  # those that joined meanwhile, too
+                browser.leave()
             if rest := asyncio.all_tasks(self._loop):  # of the browsers
                 self._loop.run_until_complete(asyncio.wait(rest, timeout=_LEAVE_SECONDS))
             self._loop.run_until_complete(self._loop.shutdown_asyncgens())

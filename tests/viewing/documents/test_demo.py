@@ -76,10 +76,8 @@ def test_other_names_and_other_hosts_are_refused(demo: DemoServer) -> None:
 
 @needs_chromium
 @pytest.mark.parametrize("size", [(1280, 800), (390, 844)])
-def test_a_click_on_a_card_shows_its_motion(
-    demo: DemoServer, tmp_path: Path, size: tuple[int, int]
-) -> None:
-    with headless_browser(tmp_path / "profile") as tab:
+def test_a_click_on_a_card_shows_its_motion(demo: DemoServer, size: tuple[int, int]) -> None:
+    with headless_browser() as tab:
         metrics = {"width": size[0], "height": size[1], "deviceScaleFactor": 1}
         tab.call("Emulation.setDeviceMetricsOverride", mobile=size[0] < 500, **metrics)
         tab.call("Page.navigate", url=demo.url)

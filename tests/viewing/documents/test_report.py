@@ -37,8 +37,8 @@ def report(motion: Trajectory, tmp_path_factory: pytest.TempPathFactory) -> Path
 
 
 @pytest.fixture(scope="module")
-def tab(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Tab]:
-    with headless_browser(tmp_path_factory.mktemp("profile")) as opened:
+def tab() -> Iterator[Tab]:
+    with headless_browser() as opened:
         yield opened
 
 

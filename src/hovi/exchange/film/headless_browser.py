@@ -16,7 +16,7 @@ import shutil
 import signal
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 from hovi.system.files import reason
@@ -40,7 +40,12 @@ class BrowserError(Exception):
 
 
 class _Connection:
-    """Commands to a browser and its answers: JSON, each with a NUL at its end."""
+    """Commands to a browser and its answers: JSON, each with a NUL at its end.
+
+    heard: called with each event.
+    """
+
+    heard: Callable[[dict[str, Any]], object] = staticmethod(lambda event: None)
 
     def __init__(self, commands: int, answers: int) -> None:
         self._commands, self._answers = commands, answers
@@ -57,7 +62,7 @@ class _Connection:
         try:
             self._send(json.dumps(command).encode() + _END, deadline)
             while (answer := json.loads(self._received(deadline))).get("id") != self._count:
-                pass  # an event
+                self.heard(answer)
         except TimeoutError:
             raise BrowserError(f"{method} takes more than {_SECONDS:.0f} s") from None
         except OSError:
@@ -96,6 +101,10 @@ class Tab:
         self._session = str(connection.call("Target.attachToTarget", joined)["sessionId"])
         self.call("Page.enable")
 
+    def hear(self, heard: Callable[[dict[str, Any]], object]) -> None:
+        """Call a function with each event that arrives before an answer."""
+        self._connection.heard = heard
+
     def call(self, method: str, **parameters: Any) -> dict[str, Any]:
         """Send a DevTools command and return its answer. Raises BrowserError."""
         return self._connection.call(method, parameters, self._session)
@@ -126,16 +135,16 @@ def browser() -> str | None:
 
 
 @contextlib.contextmanager
-def headless_tab(size: tuple[int, int]) -> Iterator[Tab]:
+def headless_tab(size: tuple[int, int], more: Sequence[str] = ()) -> Iterator[Tab]:
     """A page of a browser with a profile of its own, which ends with the block.
 
-    size: width and height, in pixels. Raises BrowserError.
+    size: width and height, in pixels. more: further flags. Raises BrowserError.
     """
     path = browser()
     if path is None:
         raise BrowserError("there is no Chromium")
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile:
-        flags = [*_FLAGS.split(), f"--window-size={size[0]},{size[1]}"]
+        flags = [*_FLAGS.split(), f"--window-size={size[0]},{size[1]}", *more]
         if os.geteuid() == 0:
             flags.append("--no-sandbox")  # Chromium has none for root
         with _started([path, *flags, f"--user-data-dir={profile}"]) as connection:
