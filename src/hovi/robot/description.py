@@ -17,7 +17,7 @@ from hovi.robot.model import ambiguous_frames, couplings_in, frame_named
 from hovi.robot.source import RobotSource
 from hovi.robot.space.angle_ranges import ranges_in_degrees
 from hovi.robot.space.joint_kinds import ANGLE, FLOATING, kind_of
-from hovi.robot.urdf.check import checked_urdf
+from hovi.robot.urdf.check import noted_urdf
 from hovi.robot.urdf.closed_loops import closed_loops
 from hovi.robot.urdf.spelling import ignored_names
 
@@ -151,7 +151,9 @@ def _notes(model: pin.Model, source: RobotSource) -> Iterator[str]:
     yield from source.notes
     if source.urdf is None:
         return
-    robot = checked_urdf(source.urdf, source.reference)
+    robot, harmless = noted_urdf(source.urdf, source.reference)
+    for note, names in harmless.items():
+        yield f"{_some(list(dict.fromkeys(names)))}: {note}"
     movable = {name for _, name in pairs}
     mimics = [j.get("name", "") for j in robot.iterfind("joint") if j.find("mimic") is not None]
     mimics = [name for name in mimics if name in movable]

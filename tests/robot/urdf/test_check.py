@@ -5,7 +5,9 @@ from pathlib import Path
 import pytest
 
 from hovi.errors import ModelError
+from hovi.robot.urdf import check
 from hovi.robot.urdf.check import check_urdf, read_urdf
+from hovi.robot.urdf.harmless import without_harmless
 from hovi.robot.urdf.planar_chain import chain
 from hovi.robot.urdf.rules import RULES
 
@@ -105,9 +107,14 @@ BROKEN = {
     "mesh climbs out later": ("arm/rod.stl", "arm/../x.stl", ["'rod'", "package"]),
     "a misspelt element": ("inertial>", "inertail>", ["'rod'", "<inertail>", "<inertial>?"]),
     "a value as text": ('<axis xyz="0 1 0"/>', "<axis>0 1 0</axis>", ["'hinge'", "'0 1 0'"]),
-    "no name": ('<robot name="arm">', "<robot>", ["<robot>", "name="]),
+    "a long name": ('name="arm"', f'name="{"arm" * 100}"', ["<robot>", "256 characters"]),
     "not a robot": ("robot", "sdf", ["<robot>", "<sdf>"]),
     "xacro": ("</robot>", "<xacro:arm/></robot>", ["xacro"]),
+    "xacro that is referred to": (
+        'value="2.0"/>',
+        'value="${2 * w}"/><xacro:property name="w" value="1"/>',
+        ["<xacro:property>", "run xacro"],
+    ),
     "broken XML": ("</robot>", "", ["well-formed"]),
     "empty": (ARM, "", ["well-formed"]),
     "NUL": ("arm", "a\0m", ["well-formed"]),
@@ -148,14 +155,14 @@ def test_the_valid_urdf_passes() -> None:
 
 
 def test_every_rule_is_violated_by_some_case() -> None:
-    import xml.etree.ElementTree as ElementTree
-
     broken = set()
     for old, new, _ in BROKEN.values():
+        builder = check._Reader("robot.urdf")
         try:
-            robot = ElementTree.fromstring(ARM.replace(old, new))
-        except (ElementTree.ParseError, ValueError):
+            robot = builder.read(ARM.replace(old, new))
+        except ModelError:
             continue
+        without_harmless(robot, "robot")
         broken.update(next((rule for rule in RULES if any(rule(robot))), None) for _ in [0])
     assert set(RULES) <= broken
 

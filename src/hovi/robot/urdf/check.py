@@ -15,6 +15,7 @@ from typing import NoReturn
 from xml.parsers import expat
 
 from hovi.errors import ModelError
+from hovi.robot.urdf.harmless import Notes, without_harmless
 from hovi.robot.urdf.rules import RULES
 from hovi.system.files import reason, require_file
 
@@ -57,13 +58,19 @@ def check_urdf(text: str, name: str = "robot.urdf") -> None:
 
 def checked_urdf(text: str, name: str = "robot.urdf") -> ElementTree.Element:
     """The element <robot> of the text of a URDF, checked. Raises ModelError."""
+    return noted_urdf(text, name)[0]
+
+
+def noted_urdf(text: str, name: str = "robot.urdf") -> tuple[ElementTree.Element, Notes]:
+    """The checked element, without what changes nothing, and notes on that. Raises ModelError."""
     if len(text) > MAX_BYTES:
         raise ModelError(_too_large(name, len(text)))
-    robot = _Reader(name).read(text)
+    robot = _Reader(name).read(text.lstrip("\ufeff \t\r\n"))
+    notes = without_harmless(robot, Path(name).stem)
     for rule in RULES:
         for sentence in rule(robot):
             raise ModelError(f"URDF {name!r}: {sentence}")
-    return robot
+    return robot, notes
 
 
 class _Reader:
@@ -97,8 +104,6 @@ class _Reader:
             self.refuse(f"it has more than {MAX_ELEMENTS:,} elements, the maximum.")
         if len(attributes) > MAX_ATTRIBUTES:
             self.refuse(f"<{tag[:40]}> has more than {MAX_ATTRIBUTES} attributes.")
-        if tag.startswith("xacro:"):
-            self.refuse(f"<{tag[:40]}> is xacro, not URDF: run xacro on the file first.")
         if self.depth == 2:
             self.count(tag, attributes.get("type", ""))
         self.builder.start(tag, attributes)

@@ -62,6 +62,13 @@ _REQUIRED: dict[str, tuple[str, ...]] = {
 }
 
 
+def nothing_is_xacro(robot: Element) -> Iterator[str]:
+    """No element of xacro is left that would have to be run."""
+    for element in robot.iter():
+        if element.tag.startswith("xacro:"):
+            yield f"<{element.tag[:40]}> is xacro, not URDF: run xacro on the file first."
+
+
 def the_robot_is_named(robot: Element) -> Iterator[str]:
     """The robot has a name."""
     name = robot.get("name", "")
@@ -106,8 +113,8 @@ def elements_are_not_repeated(robot: Element) -> Iterator[str]:
             for tag in _ONCE.get(element.tag, ()):
                 if (count := len(element.findall(tag))) > 1:
                     yield (
-                        f"<{element.tag}> of {tag_and_name(owner)} has {count} elements <{tag}>: "
-                        "keep one."
+                        f"<{element.tag}> of {tag_and_name(owner)} has {count} elements <{tag}>, "
+                        "of which other readers take the first: keep one."
                     )
 
 
@@ -255,7 +262,10 @@ def limits_are_ordered(robot: Element) -> Iterator[str]:
             continue
         lower, upper = limit.get("lower", "0"), limit.get("upper", "0")
         if float(lower) > float(upper):
-            yield f"joint {_name(joint)} has limits with lower={lower} above upper={upper}."
+            yield (
+                f"joint {_name(joint)} has limits with lower={lower} above upper={upper}, which "
+                "other readers take as they are, so that no position is allowed: swap them."
+            )
         for attribute in ("effort", "velocity"):
             if float(limit.get(attribute, "0")) < 0.0:
                 yield f"joint {_name(joint)} has a negative {attribute} limit: give 0 or more."
@@ -299,6 +309,7 @@ def is_decimal(word: str) -> bool:
 
 
 RULES: tuple[Rule, ...] = (
+    nothing_is_xacro,
     names_are_of_urdf,
     values_are_attributes,
     the_robot_is_named,
