@@ -10,6 +10,7 @@ import pinocchio as pin
 import pytest
 
 import hovi
+from hovi.planning.problem.tolerance import Tolerance
 from hovi.planning.refinement.error_estimate import finer_than
 from hovi.planning.refinement.whirling import MAX_WHIRLING_ERROR, fault_of_whirling, whirl
 from hovi.planning.solver.solver import solve_on_grid
@@ -57,8 +58,11 @@ def test_info_names_light_joints_beforehand(xarm: hovi.Scene) -> None:
     assert "little inertia" not in hovi.load_robot(hovi.example("two_link.urdf")).describe()
 
 
-def test_a_whirling_motion_that_a_finer_grid_leaves_is_no_minimum() -> None:
+def test_a_whirling_motion_that_a_finer_grid_leaves_is_no_minimum(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     """Two more modes change its cost by 0.5 %, intervals of a quarter by 3 %."""
+    monkeypatch.setattr(Tolerance, "finer", ())  # `plan` goes on to these, which resolve another
     robot = hovi.load_robot("talos_arm", locked=["gripper_left_joint"])
     scene = hovi.Scene(robot, [hovi.effects.Gravity()])
     start, goal = [1.82, 0.43, -1.69, -1.36, 0.09, -0.62], [0.48, 1.02, -0.76, -2.39, -0.94, 0.16]
@@ -126,8 +130,11 @@ def test_a_fast_whirling_motion_that_finer_grids_confirm_is_a_minimum() -> None:
     assert fault_of_whirling(found, found.error_estimate) == ""
 
 
-def test_a_motion_that_finer_grids_move_ever_further_is_no_minimum() -> None:
+def test_a_motion_that_finer_grids_move_ever_further_is_no_minimum(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     """Two more modes change its cost by 0.3 %, intervals of a quarter by 1.8 %, 37 rad away."""
+    monkeypatch.setattr(Tolerance, "finer", ())
     scene = hovi.Scene(hovi.load_robot("ur5"), [hovi.effects.Gravity()])
     start = [-2.07511832, 0.34060844, 0.34505737, 0.72300065, 1.97343618, -2.57173197]
     goal = [-2.09247888, -0.85894251, -2.42605944, -3.01370346, 2.55865486, 1.94229937]

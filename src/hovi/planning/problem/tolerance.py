@@ -29,6 +29,8 @@ LAST_BARRIER = 1e-8
 density of the cost, which exceeds its minimum by some ten times as much."""
 BARRIER_SHARE, LARGEST_BARRIER = 3e-3, 3e-6
 """The same for a tolerance of the cost, as a share of it, and at most."""
+FINER_SHARES = 1 / 30, 1e-3, 1e-5
+"""Shares of a tolerance that are tried where a minimum meets it and is not resolved."""
 REMAINING_SHARE = 0.5
 """Predicted relative decrease of the last step within limits, as a share of the last barrier."""
 
@@ -86,6 +88,11 @@ class Tolerance:
         if self.quantity is not Quantity.COST:
             return LAST_BARRIER
         return min(max(LAST_BARRIER, BARRIER_SHARE * self.size), LARGEST_BARRIER)
+
+    @property
+    def finer(self) -> tuple[Tolerance, ...]:
+        """Finer ones of the same quantity, the coarsest first."""
+        return tuple(replace(self, size=share * self.size) for share in FINER_SHARES)
 
     @classmethod
     def _parsed(cls, text: str) -> Self:

@@ -101,7 +101,7 @@ class FinalStages:
         for i, solution in enumerate(self._until_deadline(found[:MAX_REFINED])):
             which = f"minimum {i + 1} of {min(len(found), MAX_REFINED)}: " if len(found) > 1 else ""
             known = dataclasses.replace(solution, problem=on_grid_of(problem, solution))
-            refined.append(self._refined(tolerance, which, known))
+            refined.append(self.refined(tolerance, which, known))
         return distinct(refined)
 
     def with_best_durations(self, free: FreeDuration, found: list[Solution]) -> list[Solution]:
@@ -140,7 +140,7 @@ class FinalStages:
                 break
             yield each
 
-    def _refined(self, tolerance: Tolerance, which: str, known: Solution) -> Solution:
+    def refined(self, tolerance: Tolerance, which: str, known: Solution) -> Solution:
         """A minimum to a tolerance, refined without its limits if it is far from them."""
         refine = partial(
             refine_to_tolerance,
@@ -175,7 +175,7 @@ class FinalStages:
             if not again.success:
                 break
             again = dataclasses.replace(again, problem=again.problem or job.problem())
-            refined = self._refined(tolerance, "", again)
+            refined = self.refined(tolerance, "", again)
             best = refined if refined.success else best
         return best
 
@@ -205,7 +205,7 @@ class FinalStages:
         jointly = partial(self._solve_jointly, free)
         if self.fine.tolerance is None:
             return best_on_its_grid(free, self._stretched, first, jointly=jointly).with_time()
-        refine = partial(self._refined, self.fine.tolerance, f"{which}: ")
+        refine = partial(self.refined, self.fine.tolerance, f"{which}: ")
         return free_to_tolerance(free, self._stretched, refine, first, jointly)
 
     def _solve_jointly(self, free: FreeDuration, first: Solution) -> Solution | None:
@@ -238,6 +238,15 @@ def ended_early(best: Solution, status: Status, why: str) -> Solution:
         f"{best.trajectory.duration:.10g} s, of cost {best.cost:.10g}."
     )
     return dataclasses.replace(best, success=False, status=status, message=message)
+
+
+def with_tolerance(found: Solution, tolerance: Tolerance) -> Solution:
+    """A solution that was refined to a finer tolerance, as one for the tolerance that was given."""
+    known = found.accuracy
+    assert known is not None
+    accuracy = dataclasses.replace(known, tolerance=tolerance)
+    message = found.message.replace(str(known), str(accuracy))
+    return dataclasses.replace(found, accuracy=accuracy, message=message)
 
 
 def has_few_points(job: Job) -> bool:

@@ -25,6 +25,7 @@ from hovi.planning.search.final_stages import (
     has_few_points,
     on_grid_of,
     with_more_points,
+    with_tolerance,
 )
 from hovi.planning.search.free_duration import FreeDuration
 from hovi.planning.search.job import Job, split_for_charts
@@ -180,7 +181,8 @@ class Search:
             self.progress("comparing with a finer grid", 0.95)
         for i, solution in enumerate(found[:MAX_REFINED]):
             problem = solution.problem or on_grid_of(self.fine.problem(), solution)
-            after = resolved(dataclasses.replace(solution, problem=problem))
+            after = resolved(known := dataclasses.replace(solution, problem=problem))
+            after = self._at_finer_tolerances(known, after)
             checked.append(self._with_duration(after) if solution.success else after)
             if checked[-1].success:
                 return [_noting_cheaper(checked), *found[i + 1 :]]
@@ -188,6 +190,27 @@ class Search:
                 break
         best = self._seeing_features(found[0], checked[0])
         return [best if self.fine.tolerance is None else unresolved_if_whirling(best)]
+
+    def _at_finer_tolerances(self, solution: Solution, refused: Solution) -> Solution:
+        """A minimum that is not resolved at its tolerance, at the first finer one at which it is.
+
+        A coarse tolerance may be met on a grid that two finer ones contradict. refused: the
+        solution with the reason. It is kept where no tolerance helps.
+        """
+        given = self.fine.tolerance
+        if given is None or self.free is not None or refused.status is not Status.UNRESOLVED:
+            return refused
+        stages = FinalStages(self.fine, self.deadline, self.progress)
+        for finer in given.finer:
+            if self.deadline.passed or interrupted() or NARROW in refused.message:
+                break
+            solution = stages.refined(finer, "", solution)
+            if not solution.success:
+                break
+            after = resolved(solution)
+            if after.success:
+                return with_tolerance(after, given)
+        return refused
 
     def _seeing_features(self, solution: Solution, refused: Solution) -> Solution:
         """A motion that was refused for narrow features of effects, on a grid that sees them.
