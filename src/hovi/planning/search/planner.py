@@ -36,7 +36,7 @@ from hovi.planning.search.options import PlanOptions
 from hovi.planning.search.search import Search
 from hovi.planning.search.smoothing import smoothed
 from hovi.planning.solver.outcome.self_collision import self_collision_sentence
-from hovi.planning.solver.outcome.without_solve import infeasible_at_once, unresolved_at_once
+from hovi.planning.solver.outcome.without_solve import without_search
 from hovi.planning.solver.solver import Solution
 from hovi.planning.solver.status import Status
 from hovi.robot.robot import Robot
@@ -148,11 +148,8 @@ def plan(
     warn_of_ends(scene.robot, job.start, job.goal, chosen, found.reason)
     for sentence in found.warnings:
         warn(sentence)
-    nothing = None
-    if found.reason:
-        nothing = infeasible_at_once(longest, chosen.guess, found.reason)
-    elif fault := job.fault_of_time:
-        nothing = unresolved_at_once(problem, chosen.guess, fault)
+    fault = "" if found.reason else job.fault_of_time
+    nothing = without_search(problem, longest, chosen.guess, found.reason, fault)
     if nothing is not None:
         seconds = time.perf_counter() - began
         return with_notes(nothing, [job.scene], job.options, apart, seconds)

@@ -4,12 +4,21 @@ from __future__ import annotations
 
 from hovi.discrete.grid import DiscretePath
 from hovi.discrete.trajectory import Trajectory
+from hovi.planning.problem.presolve.swings import too_many_swings
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.initial_path import guess_path
 from hovi.planning.solver.methods.method import MethodResult
 from hovi.planning.solver.outcome.cost_with_time import cost_of
 from hovi.planning.solver.solver import Solution, solution_of
 from hovi.planning.solver.status import Status, infeasible_sentence
+
+WIDER = "make what changes wider than that, or leave it out"
+"""What to do about formulas that change too fast."""
+SHORTER = (
+    "plan a motion of seconds and rest before or after it, or add the effect viscous_friction or a "
+    "cost on the motion"
+)
+"""What to do about motions that take too long."""
 
 
 def minimum_at(
@@ -26,14 +35,14 @@ def minimum_at(
 
 
 def unresolved_at_once(
-    problem: TrajectoryProblem, guess: str | Trajectory | DiscretePath, reason: str
+    problem: TrajectoryProblem,
+    guess: str | Trajectory | DiscretePath,
+    reason: str,
+    advice: str = WIDER,
 ) -> Solution:
-    """The guess of a problem that no grid resolves. reason: as a clause."""
+    """The guess of a problem that no grid resolves. reason, advice: as clauses."""
     path = guess_path(problem, guess)
-    message = (
-        f"no motion was sought, since no grid would resolve it: {reason}; make what changes wider "
-        "than that, or leave it out."
-    )
+    message = f"no motion was sought, since no grid would resolve it: {reason}; {advice}."
     value = cost_of(problem, path)
     return solution_of(MethodResult(problem, path, value, Status.UNRESOLVED, message), 0.0, 0.0)
 
@@ -45,3 +54,24 @@ def infeasible_at_once(
     path, message = guess_path(problem, guess), infeasible_sentence(reason)
     value = cost_of(problem, path)
     return solution_of(MethodResult(problem, path, value, Status.INFEASIBLE, message), 0.0, 0.0)
+
+
+def without_search(
+    problem: TrajectoryProblem,
+    longest: TrajectoryProblem,
+    guess: str | Trajectory | DiscretePath,
+    reason: str,
+    fault: str,
+) -> Solution | None:
+    """The solution of a plan that is not searched for; None if one is.
+
+    longest: the problem with its longest duration, the same one for a given duration. reason: why
+    there is no motion, as a clause; "" if one may exist. fault: of the formulas of time, likewise.
+    """
+    if reason:
+        return infeasible_at_once(longest, guess, reason)
+    if fault:
+        return unresolved_at_once(problem, guess, fault)
+    if longest is problem and (often := too_many_swings(problem)):
+        return unresolved_at_once(problem, guess, often, SHORTER)
+    return None
