@@ -28,7 +28,7 @@ def test_the_code_of_a_page_runs(page: Path, tmp_path: Path) -> None:
         pytest.importorskip("imageio_ffmpeg")
     (tmp_path / "models").symlink_to(TOP / "models")
     (tmp_path / ".venv").symlink_to(sys.prefix)
-    file = tmp_path / "typed.py"
+    file = (tmp_path / "typed").with_suffix(".py")
     file.write_text(script(page))
     path = {"PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"}
     done = subprocess.run(

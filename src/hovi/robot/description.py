@@ -17,6 +17,7 @@ from hovi.robot.model import ambiguous_frames, couplings_in, frame_named
 from hovi.robot.source import RobotSource
 from hovi.robot.space.angle_ranges import ranges_in_degrees
 from hovi.robot.space.joint_kinds import ANGLE, FLOATING, kind_of
+from hovi.robot.space.unit_hints import unit_hints
 from hovi.robot.urdf.check import noted_urdf
 from hovi.robot.urdf.closed_loops import closed_loops
 from hovi.robot.urdf.spelling import ignored_names
@@ -132,6 +133,7 @@ def _notes(model: pin.Model, source: RobotSource) -> Iterator[str]:
             "angle, an orientation a unit quaternion (x, y, z, w)"
         )
     yield from _suspicious_ranges(pairs, model)
+    yield from unit_hints(model)
     for name in ambiguous_frames(model):
         taken = _FRAME_WORDS.get(frame_named(model, name).type, "joint")
         yield (
@@ -167,6 +169,17 @@ def _notes(model: pin.Model, source: RobotSource) -> Iterator[str]:
             f"the position range of {_some(unbounded)} is not enforced, since its leader is a "
             "continuous joint"
         )
+    if empty := [name for name in _without_range(robot) if name in movable]:
+        yield (
+            f"no range of positions at {_some(empty)} (lower = upper): lock such joints, make them "
+            "continuous, or give their ranges as limits"
+        )
+    if controllers := [
+        joint.get("name", "")
+        for joint in robot.iterfind("joint")
+        if joint.find("safety_controller") is not None and joint.get("name") in movable
+    ]:
+        yield f'safety controllers at {_some(controllers)}: limits = "soft" has their ranges'
     if ties := closed_loops(robot):
         yield f"not kept, so that its links move freely: {_some(ties)}"
     if names := ignored_names(robot):
@@ -232,6 +245,16 @@ def _ranges_not_kept(model: pin.Model, robot: ElementTree.Element) -> Iterator[s
         continuous = model.joints[model.getJointId(coupling.leader)].nq == 2
         if continuous and joint is not None and joint.get("type") == "revolute":
             yield coupling.follower
+
+
+def _without_range(robot: ElementTree.Element) -> Iterator[str]:
+    """Joints with a range whose bounds are equal, or missing."""
+    for joint in robot.iterfind("joint"):
+        limit = joint.find("limit")
+        if joint.get("type") not in ("revolute", "prismatic") or limit is None:
+            continue
+        if float(limit.get("lower", "0")) == float(limit.get("upper", "0")):
+            yield joint.get("name", "")
 
 
 def _breaks_triangle(link: ElementTree.Element) -> bool:

@@ -431,7 +431,11 @@ def test_saved_limits_are_read_back(table: str, folder: Path) -> None:
 
 WRONG_LIMITS = {
     "unknown key": ("v = 3", "w = 3", ["line 24", "`limits.w`", "valid names", "'v'"]),
-    "unknown base": ('base = "none"', 'base = "urd"', ["`limits.base`", '"urdf", "none" or']),
+    "unknown base": (
+        'base = "none"',
+        'base = "urd"',
+        ["`limits.base`", '"soft", "none" or'],
+    ),
     "word for numbers": ("v = 3", 'v = "slow"', ["line 24", "`limits.v`", '"slow"', "pair"]),
     "boolean": ("v = 3", "v = true", ["`limits.v`", "true"]),
     "negative": ("v = 3", "v = -3", ["line 24", "limits.v of 'shoulder'", "positive", "-3"]),

@@ -38,7 +38,7 @@ def plan(
     limits: Annotated[
         str | None,
         typer.Option(
-            metavar="urdf|none|ARM", help="Override the scene's; ARM such as panda, ur5e."
+            metavar="urdf|soft|none|ARM", help="Override the scene's; ARM such as panda, ur5e."
         ),
     ] = None,
     smooth: Annotated[
@@ -109,7 +109,7 @@ def _options(flags: dict[str, Any]) -> dict[str, Any]:
     }
     if "time_limit" in given:
         given["time_limit"] = positive_seconds("--time-limit", given["time_limit"])
-    limits, names = given.get("limits", "none"), ("urdf", "none", *NAMES)
+    limits, names = given.get("limits", "none"), ("urdf", "soft", "none", *NAMES)
     if limits not in names:
         hint = nearest(limits, names)
         raise InputError(f"--limits {limits!r}: {hint} Give other limits in the scene file.")

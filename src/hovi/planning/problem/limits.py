@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from functools import cached_property
 from typing import Any
 
@@ -16,6 +16,7 @@ from hovi.checks.shapes import require_shape
 from hovi.errors import InputError, nearest, warn
 from hovi.planning.problem.arms.limit_set import KIND_NAMES, OF_ORDER_3, is_limit_set, limit_set
 from hovi.planning.problem.arms.limit_set import NAMES as ARMS
+from hovi.planning.problem.arms.urdf_ranges import require_ranges, soft_ranges
 from hovi.planning.problem.notation.limit_entries import entries, number_in
 from hovi.planning.problem.notation.summaries import LimitsSummary
 from hovi.planning.problem.way_back.excused import Excused, widening
@@ -29,6 +30,8 @@ Range = tuple[Array, Array]
 
 KINDS = tuple(KIND_NAMES)
 """The limited quantities, in the order of the rows of Limits."""
+URDF_NAMES = "urdf", "soft"
+"""Limits that the URDF states."""
 FIRST_KINDS = len(KINDS) - len(OF_ORDER_3)
 """Number of those that motions of order 2 have; the others, which come last, need order 3."""
 UNBOUNDED = 1e15
@@ -271,13 +274,22 @@ def no_limits(coordinates: Coordinates) -> Limits:
     return Limits(np.full(shape, -np.inf), np.full(shape, np.inf))
 
 
-def urdf_limits(robot: Robot) -> Limits:
-    """Position, velocity and effort limits of the URDF; 0 or a missing value means no limit."""
+def urdf_limits(robot: Robot, soft: bool = False) -> Limits:
+    """Position, velocity and effort limits of the URDF; 0 or a missing value means no limit.
+
+    An empty range of positions counts as missing, too.
+    soft: whether positions have the soft limits of safety controllers. InputError without any.
+    """
     shape = (FIRST_KINDS, robot.nv)
     lower, upper = np.full(shape, -np.inf), np.full(shape, np.inf)
     if not robot.unplanned_joints:
         iq, iv = robot.space.plain
         lower[0, iv], upper[0, iv] = robot.lower[iq], robot.upper[iq]
+    for name, pair in soft_ranges(robot).items() if soft else ():
+        i = robot.coordinate_names.index(name)
+        lower[0, i], upper[0, i] = pair
+    empty = lower[0] >= upper[0]
+    lower[0, empty], upper[0, empty] = -np.inf, np.inf
     for row, size in ((1, robot.velocity_limit), (3, robot.effort_limit)):
         bound = np.where(size > 0, size, np.inf)
         lower[row], upper[row] = -bound, bound
@@ -291,10 +303,11 @@ def as_limits(
 ) -> Limits:
     """Limits from a name or a mapping, as `plan` and scene files accept them.
 
-    limits: "urdf" (of a robot), "none", the name of an arm of `hovi.limit_sets`, a Limits, or a
-        mapping with any of `base` (one of these names, "urdf" by default), `q`, `v`, `a`, `tau`,
-        `jerk`, `torque_rate`, `margin` and `tolerance`. A kind is a number or a list of numbers x
-        for -x and x, a list of pairs (lower, upper), or a mapping from joint names to either.
+    limits: "urdf" (of a robot), "soft" (the same, with the soft limits of its safety controllers),
+        "none", the name of an arm of `hovi.limit_sets`, a Limits, or a mapping with any of `base`
+        (one of these names, "urdf" by default), `q`, `v`, `a`, `tau`, `jerk`, `torque_rate`,
+        `margin` and `tolerance`. A kind is a number or a list of numbers x for -x and x, a list of
+        pairs (lower, upper), or a mapping from joint names to either.
     order: of the motion's Lagrangian. What an arm's set says of the jerk and the torque rate
         applies from order 3 on.
     Raises InputError for unknown keys or joints and for bounds that do not fit the
@@ -304,16 +317,17 @@ def as_limits(
         return limits
     if not isinstance(limits, str | Mapping):
         raise InputError(
-            f"limits are 'urdf', 'none', the name of an arm, a mapping or a hovi.Limits, not "
-            f"{shown(limits)}."
+            "limits are 'urdf', 'soft', 'none', the name of an arm, a mapping or a hovi.Limits, "
+            f"not {shown(limits)}."
         )
     if not isinstance(limits, Mapping):
-        return _warned_of_degrees(coordinates, _by_name(coordinates, limits, order))
+        return _warned_of_degrees(coordinates, _by_name(coordinates, limits, order, ()))
     keys = ("base", *KINDS, "margin", "tolerance")
     for key in limits:
         if key not in keys:
             raise InputError(f"unknown key `limits.{key}`; {nearest(str(key), keys)}")
-    base = _by_name(coordinates, limits.get("base", "urdf"), order)
+    own = entries(coordinates, "q", limits.get("q", {}))
+    base = _by_name(coordinates, limits.get("base", "urdf"), order, own)
     if not limits.keys().isdisjoint(OF_ORDER_3):
         base = _with_all_kinds(base)
     lower, upper = base.lower.copy(), base.upper.copy()
@@ -340,19 +354,23 @@ def _warned_of_degrees(coordinates: Coordinates, limits: Limits) -> Limits:
     return limits
 
 
-def _by_name(coordinates: Coordinates, name: Any, order: int) -> Limits:
+def _by_name(coordinates: Coordinates, name: Any, order: int, own: Collection[int]) -> Limits:
+    """Limits that have a name. own: coordinates whose positions are bounded otherwise."""
     if name == "none":
         return no_limits(coordinates)
     if is_limit_set(name):
         return _of_arm(coordinates, name, order)
-    if name != "urdf":
-        hint = f": {nearest(name, ('urdf', 'none', *ARMS))}" if isinstance(name, str) else "."
+    if name not in URDF_NAMES:
+        known = (*URDF_NAMES, "none", *ARMS)
+        hint = f": {nearest(name, known)}" if isinstance(name, str) else "."
         raise InputError(
-            f"limits are 'urdf', 'none', the name of an arm or given by kind, not {name!r}{hint}"
+            "limits are 'urdf', 'soft', 'none', the name of an arm or given by kind, not "
+            f"{name!r}{hint}"
         )
     if not isinstance(coordinates, Robot):
         raise InputError(f"{coordinates.owner} has no URDF: limits need base = 'none' here.")
-    return urdf_limits(coordinates)
+    require_ranges(coordinates, own)
+    return urdf_limits(coordinates, name == "soft")
 
 
 def _of_arm(coordinates: Coordinates, name: str, order: int) -> Limits:

@@ -101,8 +101,9 @@ class PlanOptions:
     )
     limits: str | Limits | Mapping[str, Any] = option(
         "urdf",
-        'bounds on q, v, a and tau along the whole motion: "urdf" (those of the URDF), "none", the '
-        "name of an arm of hovi.limit_sets, a Limits, or a mapping as for as_limits.",
+        'bounds on q, v, a and tau along the whole motion: "urdf" (those of the URDF), "soft" '
+        '(with those of its safety controllers), "none", the name of an arm of hovi.limit_sets, a '
+        "Limits, or a mapping as for as_limits.",
     )
     strict: bool = option(
         False,

@@ -1,4 +1,4 @@
-"""`limits`: "urdf", "none" or the table [limits], checked against the robot."""
+"""`limits`: "urdf", "soft", "none" or the table [limits], checked against the robot."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from pydantic import ValidationError
 
 from hovi.errors import InputError, nearest
 from hovi.planning.problem.arms.limit_set import NAMES as ARMS
-from hovi.planning.problem.limits import KINDS, Limits, as_limits
+from hovi.planning.problem.limits import KINDS, URDF_NAMES, Limits, as_limits
 from hovi.planning.task_file.effect_tables import plain
 from hovi.planning.task_file.messages import Keys, TomlText, first_sentence, in_toml, spelled
 from hovi.planning.task_file.schema import LimitsTable
 from hovi.robot.robot import Robot
 
-NAMES = ("urdf", "none", *ARMS)
+NAMES = (*URDF_NAMES, "none", *ARMS)
 
 
 def read_limits(
@@ -27,7 +27,7 @@ def read_limits(
         _check(keys, given, robot, toml)
         return given
     if not isinstance(given, dict):
-        expected = '"urdf", "none", the name of an arm or a table [limits]'
+        expected = '"urdf", "soft", "none", the name of an arm or a table [limits]'
         hint = f": {nearest(given, NAMES)}" if isinstance(given, str) else ""
         sentence = f"`{spelled(keys)}` must be {expected}, but it is {in_toml(given)}{hint}"
         raise toml.error(keys, sentence)

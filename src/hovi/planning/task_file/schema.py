@@ -187,7 +187,7 @@ class SegmentTable(Table):
     duration: PositiveSeconds = Field(description=SECONDS_IN_WORDS)
     goal: Goal = Field(default=None, description=_END.format("[segments.goal]"))
     limits: Any = Field(
-        default=None, description='"urdf", "none", the name of an arm or a table of limits'
+        default=None, description='"urdf", "soft", "none", the name of an arm or a table of limits'
     )
     effects: dict[str, dict[str, Any]] = Field(default={}, description="tables of effects")
 
@@ -204,7 +204,7 @@ class SchemeTable(Table):
     )
 
 
-LimitsName = Literal["urdf", "none", LimitSetName]
+LimitsName = Literal["urdf", "soft", "none", LimitSetName]
 """The limits that have a name."""
 
 
@@ -212,7 +212,7 @@ class LimitsTable(Table):
     """[limits]."""
 
     base: LimitsName = Field(
-        default="urdf", description='"urdf", "none" or the name of an arm, such as "panda"'
+        default="urdf", description='"urdf", "soft", "none" or the name of an arm, such as "panda"'
     )
     q: Bounds | None = Field(default=None, description=_BOUNDS)
     v: Bounds | None = Field(default=None, description=_BOUNDS)
@@ -273,7 +273,7 @@ class ShapedTable(Table):
         default=None, description="the name of a group of joints in the robot's SRDF"
     )
     limits: Any = Field(
-        default="urdf", description='"urdf", "none", the name of an arm or a table [limits]'
+        default="urdf", description='"urdf", "soft", "none", the name of an arm or a table [limits]'
     )
     obstacles: Annotated[list[dict[str, Any]], BeforeValidator(_listed)] = Field(
         default=[], description="tables [[obstacles]], or one table [obstacles]"
