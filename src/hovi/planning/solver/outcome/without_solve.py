@@ -40,9 +40,9 @@ def unresolved_at_once(
     reason: str,
     advice: str = WIDER,
 ) -> Solution:
-    """The guess of a problem that no grid resolves. reason, advice: as clauses."""
+    """The guess of a problem that a grid is not likely to resolve. reason, advice: as clauses."""
     path = guess_path(problem, guess)
-    message = f"no motion was sought, since no grid would resolve it: {reason}; {advice}."
+    message = f"no motion was sought, since a grid is not likely to resolve it: {reason}; {advice}."
     value = cost_of(problem, path)
     return solution_of(MethodResult(problem, path, value, Status.UNRESOLVED, message), 0.0, 0.0)
 
