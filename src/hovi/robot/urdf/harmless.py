@@ -11,7 +11,7 @@ import math
 from collections.abc import Iterator
 from xml.etree.ElementTree import Element
 
-from hovi.robot.urdf.elements import tag_and_name
+from hovi.robot.urdf.elements import NUMBERS, tag_and_name
 
 XACRO = "xacro:"
 DEFINITIONS = tuple(XACRO + each for each in ("property", "arg", "macro"))
@@ -88,18 +88,19 @@ def _fixed_axes(robot: Element, _: str) -> Iterator[tuple[str, str]]:
 
 def _points(robot: Element, _: str) -> Iterator[tuple[str, str]]:
     """A mass without an inertia, on a link that is fixed to another one, is that of a point."""
-    for joint in robot.iterfind("joint"):
-        child = joint.find("child")
-        if joint.get("type") != "fixed" or child is None:
+    fixed = {
+        child.get("link")
+        for joint in robot.iterfind("joint")
+        for child in joint.iterfind("child")
+        if joint.get("type") == "fixed"
+    }
+    for link in robot.iterfind("link"):
+        inertial = link.find("inertial")
+        if inertial is None or link.get("name") not in fixed:
             continue
-        for link in robot.iterfind("link"):
-            inertial = link.find("inertial")
-            if link.get("name") != child.get("link") or inertial is None:
-                continue
-            if inertial.find("mass") is not None and inertial.find("inertia") is None:
-                zeros = dict.fromkeys(("ixx", "ixy", "ixz", "iyy", "iyz", "izz"), "0")
-                inertial.append(Element("inertia", zeros))
-                yield tag_and_name(link), "a mass without <inertia> is that of a point"
+        if inertial.find("mass") is not None and inertial.find("inertia") is None:
+            inertial.append(Element("inertia", dict.fromkeys(NUMBERS["inertia"], "0")))
+            yield tag_and_name(link), "a mass without <inertia> is that of a point"
 
 
 def _scales(robot: Element, _: str) -> Iterator[tuple[str, str]]:
