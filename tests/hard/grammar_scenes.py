@@ -168,6 +168,7 @@ OPTIONS: dict[str, Any] = {
     "max_iterations": WHOLE,
     "time_limit": SECONDS,
     "continuation": FLAG,
+    "objective": _leaf("effort", "acceleration", "jerk", types="text"),
     "smooth": FLAG,
     "tolerance": _leaf(1e-3, "1 mm", types="integer float text"),
     "passive": NAMES,

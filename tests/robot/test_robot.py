@@ -545,7 +545,7 @@ def test_the_description_says_if_planning_is_not_possible(tmp_path: Path, models
     path = tmp_path / "light.urdf"
     path.write_text(re.sub(r'(<mass value=|i[xyz]{2}=)"[^"]*"', r'\1"0"', text))
     words = load_robot(path).describe()
-    assert "Planning is not possible: the mass matrix" in words
+    assert "Planning with torques is not possible: the mass matrix" in words
     assert "'shoulder'" in words
 
 

@@ -132,11 +132,11 @@ def _from_rotors(task: Task, budget: Budget) -> Solution:
     if isinstance(task.duration, tuple):
         raise UnmeasurableError("rotors need a fixed duration.")
     grid = Grid.uniform(
-        task.duration, ROTOR_INTERVALS, galerkin_with_more_points(4, task.scene.order)
+        task.duration, ROTOR_INTERVALS, galerkin_with_more_points(4, task.planned_scene.order)
     )
     options = task.options.on(task.scene)
     job = split_for_charts(
-        Job(task.held_scene, grid, task.start_state, task.goal, options), options.guess
+        Job(task.planned_scene, grid, task.start_state, task.goal, options), options.guess
     )
     guess: str | Trajectory = options.guess
     for stage in lighter_rotors(job):

@@ -58,12 +58,15 @@ class AccelerationCost(Effect):
 
     def check(self, robot: Robot) -> None:
         """Raise SceneError for unknown joints and negative weights."""
-        joint_values(robot, "effect 'acceleration_cost': weight", self.weight, 0)
+        self.weights(robot)
+
+    def weights(self, robot: Robot) -> Array:
+        """w, shape (nv,)."""
+        return joint_values(robot, "effect 'acceleration_cost': weight", self.weight, 0)
 
     def potential(self, robot: Robot, symbols: SceneSymbols) -> ca.SX:
         """The weighted squares of the accelerations."""
-        weight = joint_values(robot, "effect 'acceleration_cost': weight", self.weight, 0)
-        return ca.dot(ca.DM(weight), symbols.a**2) / 2
+        return ca.dot(ca.DM(self.weights(robot)), symbols.a**2) / 2
 
     def describe(self) -> str:
         """One line for the description of a scene."""

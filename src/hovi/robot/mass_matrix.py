@@ -46,35 +46,51 @@ class MassMatrix:
 def check_mass_matrix(model: pin.Model) -> None:
     """Raise ModelError if the mass matrix M(q) is singular to working precision.
 
-    The test is lambda_min(M) <= 10 nv eps lambda_max(M) at four fixed random configurations. The
-    neutral one is no criterion: a pendulum that hangs straight down has no inertia about the
-    vertical. The message names the joints without inertia.
+    The message names the joints without inertia, and what to do.
+    """
+    joints = joints_without_inertia(model)
+    if joints:
+        raise ModelError(_singular_mass_sentence(model, joints))
+
+
+def joints_without_inertia(model: pin.Model) -> list[int]:
+    """The joints with the largest shares in the null space of M(q); none if M is regular.
+
+    M is singular if lambda_min(M) <= 10 nv eps lambda_max(M) at one of four fixed random
+    configurations. The neutral one is no criterion: a pendulum that hangs straight down has no
+    inertia about the vertical.
     """
     if model.nv == 0:
-        return
+        return []
     samples = np.array(list(_sample_configurations(model)))
     values, vectors = np.linalg.eigh(MassMatrix(model)(samples))
     free = values <= 10.0 * model.nv * np.finfo(float).eps * values[:, -1:]
-    if free.any():
-        first = int(np.argmax(free.any(axis=1)))
-        share = np.sum(vectors[first][:, free[first]] ** 2, axis=1)  # (nv,)
-        raise ModelError(_singular_mass_sentence(model, share))
-
-
-def _singular_mass_sentence(model: pin.Model, share: Array) -> str:
-    """A message that names the joints with the largest shares (nv,) in the null space of M."""
-    joints = [
+    if not free.any():
+        return []
+    first = int(np.argmax(free.any(axis=1)))
+    share = np.sum(vectors[first][:, free[first]] ** 2, axis=1)  # (nv,)
+    return [
         index
         for index, joint in enumerate(model.joints[1:], start=1)
         if share[joint.idx_v : joint.idx_v + joint.nv].max(initial=0.0) >= 0.5 * share.max()
     ]
-    names = [str(model.names[joint]) for joint in joints]
-    moved = ", ".join(f"{model.names[j]!r}{_link_of(model, j)}" for j in joints[:3])
+
+
+def named_joints(model: pin.Model, joints: list[int]) -> str:
+    """The names of joints, up to three of them, with the links that they move."""
     more = f" and {len(joints) - 3} more" if len(joints) > 3 else ""
+    return ", ".join(f"{model.names[j]!r}{_link_of(model, j)}" for j in joints[:3]) + more
+
+
+def _singular_mass_sentence(model: pin.Model, joints: list[int]) -> str:
+    """The message about torques of a robot that has joints without inertia."""
+    names = [str(model.names[joint]) for joint in joints]
     return (
-        f"the mass matrix of robot {model.name!r} is singular to working precision: there is no "
-        f"inertia at joint {moved}{more}; give the links that it moves a mass and an inertia, or "
-        f"lock it with locked={names!r}."
+        f"the mass matrix of robot {model.name!r} is singular to working precision, so it has no "
+        f"torques: there is no inertia at joint {named_joints(model, joints)}; give the links that "
+        "it moves a mass and an inertia, such as their shapes times a density, or the joint a "
+        'rotor by the effect armature, or plan without torques by objective = "acceleration" or '
+        f'"jerk", or lock it with locked={names!r}.'
     )
 
 

@@ -371,7 +371,7 @@ class Robot(Coordinates):
         try:
             self.check_mass_matrix()
         except ModelError as singular:
-            text += f"\n\nPlanning is not possible: {singular}"
+            text += f"\n\nPlanning with torques is not possible: {singular}"
         return text
 
     def to_dict(self) -> dict[str, Any]:

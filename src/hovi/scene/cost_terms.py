@@ -58,6 +58,7 @@ class RunningCostTerm:
         first, last = (named[0], named[-1] + 1) if named else (0, 0)
         self.columns = slice(first * n, last * n)
         """From the first to the last of q, v and a that C names, in x."""
+        self.names_torques = bool(ca.depends_on(expression, tau))
         nothing, arguments = ca.SX(0, 1), [q, v, a, tau, t]
         hessian, gradient = tangent.hessian(
             expression, (q, ca.vertcat(v, a, tau), nothing, nothing), space

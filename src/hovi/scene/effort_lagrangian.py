@@ -84,6 +84,12 @@ class EffortLagrangian(Lagrangian):
         return self.weight
 
     @property
+    def needs_torques(self) -> bool:
+        """Whether torques are part of the cost."""
+        more = self.running_cost
+        return bool(self.weight.any()) or (more is not None and more.names_torques)
+
+    @property
     def output_name(self) -> str:
         """Name of an output in messages."""
         return "torque"

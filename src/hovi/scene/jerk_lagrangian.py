@@ -88,6 +88,11 @@ class JerkLagrangian(Lagrangian):
         return np.concatenate([R, np.zeros(self.nv)]) if self.torque_rates else R
 
     @property
+    def needs_torques(self) -> bool:
+        """Whether torques are part of the cost."""
+        return self.effort.needs_torques
+
+    @property
     def output_name(self) -> str:
         """Name of an output in messages."""
         return self.effort.output_name

@@ -122,6 +122,11 @@ class Lagrangian(ABC):
         return np.zeros(0)
 
     @property
+    def needs_torques(self) -> bool:
+        """Whether it is one of a robot's torques or energies, for which every joint has inertia."""
+        return True
+
+    @property
     def output_name(self) -> str:
         """Name of an output in messages."""
         return "output"

@@ -26,6 +26,7 @@ def require_regular(
     (C_taua X)^T + X^T (V_aa + C_aa) X with X = M^-1, and has to be invertible
     [ColomboFerraroMartin2016, section 2]. In the rounding of d2 L~/da2 = M W M a weight of zero
     might be lost, so that W is computed from its parts.
+    Where torques cost nothing, W = V_aa + C_aa, which needs no inertia.
 
     lagrangian: of the robot. active: whether each coordinate has a motor, shape (nv,).
     """
@@ -63,10 +64,12 @@ def _curvature(lagrangian: EffortLagrangian, jet: tuple[Array, Array, Array], t:
     n = lagrangian.nv
     W = np.tile(np.diag(lagrangian.weight), (len(t), 1, 1))
     tau, J = lagrangian.torque(*jet, t)
-    try:
-        X = np.linalg.inv(J[:, :, 2 * n :])
-    except np.linalg.LinAlgError:
-        return np.full_like(W, np.nan)
+    X: Array = np.tile(np.eye(n), (len(t), 1, 1))
+    if lagrangian.needs_torques:
+        try:
+            X = np.asarray(np.linalg.inv(J[:, :, 2 * n :]))
+        except np.linalg.LinAlgError:
+            return np.full_like(W, np.nan)
     direct = np.zeros((len(t), n, n))
     if lagrangian.potential is not None:
         direct += lagrangian.potential.expand(*jet, t=t)[2][:, 2 * n :, 2 * n :]

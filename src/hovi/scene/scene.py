@@ -21,7 +21,7 @@ from hovi.dynamics.torque_model import AnalyticTorque, CasadiTorque, SummedTorqu
 from hovi.effects.effect import Effect
 from hovi.effects.registration import REGISTRY
 from hovi.errors import ModelError, SceneError, nearest
-from hovi.robot.mass_matrix import check_mass_matrix
+from hovi.robot.mass_matrix import check_mass_matrix, joints_without_inertia, named_joints
 from hovi.robot.mimic_model import PortableModel, check_coupling
 from hovi.robot.robot import Robot
 from hovi.scene.cost_terms import PotentialTerm, RunningCostTerm
@@ -318,15 +318,26 @@ def require_known_joints(robot: Robot) -> None:
 
 
 @lru_cache(maxsize=64)
-def require_plannable(scene: Scene) -> None:
-    """Raise ModelError for a robot without moving joints or with an invalid mass matrix."""
+def without_inertia(scene: Scene) -> str:
+    """The joints without inertia, in words; "" if the mass matrix is regular."""
+    joints = joints_without_inertia(scene.model)
+    return named_joints(scene.model, joints)
+
+
+@lru_cache(maxsize=64)
+def require_plannable(scene: Scene, torques: bool = True) -> None:
+    """Raise ModelError for a robot without moving joints or with an invalid mass matrix.
+
+    torques: whether they are asked for; without them, no mass matrix is needed.
+    """
     robot = scene.robot
     require_known_joints(robot)
     if robot.nv == 0:
         raise ModelError(
             f"robot {robot.name!r} has no joint that moves; load it with fewer joints locked."
         )
-    check_mass_matrix(scene.model)
+    if torques and without_inertia(scene):
+        check_mass_matrix(scene.model)
 
 
 def _effect(key: str, values: object, name: str = "effects") -> Effect:

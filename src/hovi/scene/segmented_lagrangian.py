@@ -94,6 +94,11 @@ class SegmentedLagrangian(Lagrangian):
         return self.lagrangians[0].output_weight
 
     @property
+    def needs_torques(self) -> bool:
+        """Whether torques are part of the cost of a segment."""
+        return any(each.needs_torques for each in self.lagrangians)
+
+    @property
     def output_name(self) -> str:
         """Name of an output in messages."""
         return self.lagrangians[0].output_name

@@ -41,6 +41,12 @@ def plan(
             metavar="urdf|soft|none|ARM", help="Override the scene's; ARM such as panda, ur5e."
         ),
     ] = None,
+    objective: Annotated[
+        str | None,
+        typer.Option(
+            metavar="effort|acceleration|jerk|time", help="Override the scene's: what is minimised."
+        ),
+    ] = None,
     smooth: Annotated[
         bool | None,
         typer.Option("--smooth/--no-smooth", help="Override the scene's: a cost on the jerk."),
@@ -201,7 +207,7 @@ def _note_assumptions(task: Task) -> None:
     from hovi.planning.problem.presolve.assumptions import assumptions
     from hovi.planning.search.group import in_group
 
-    scene, group = task.scene, task.options.group
+    scene, group = task.planned_scene, task.options.group
     noted = [task.note] if task.note else []
     if group is not None:
         scene, _, _ = in_group(scene, group, task.start, task.goal)

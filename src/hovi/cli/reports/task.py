@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 def describe_task(task: Task) -> str:
     """Describe the boundary states, the scheme, the scene and the robot of a task."""
     from hovi.cli.reports.arm_limits import limit_set_of, source_lines
+    from hovi.planning.problem.notation.objective import describe_objective
     from hovi.planning.problem.tolerance import as_number_or_text
 
     robot, options = task.scene.robot, task.options
@@ -28,6 +29,8 @@ def describe_task(task: Task) -> str:
     lines.append(
         f"starts {options.starts}, seed {options.seed}, limits {_limits(task.options.limits)}"
     )
+    if options.objective != "effort":
+        lines.append(describe_objective(task.scene, options.objective))
     if options.smooth:
         lines.append("smooth: with a cost on the jerk, see the effect jerk_cost")
     arm = limit_set_of(task)
@@ -41,7 +44,7 @@ def describe_task(task: Task) -> str:
     lines += _segments(task) if task.segments else _end(task.goal, "goal", robot)
     for via in options.via:
         lines += [f"via at {via.time:g} s:", *(f"  {x}" for x in _end(via.goal, "via", robot))]
-    return "\n".join([*lines, "", task.scene.describe(), "", robot.describe()])
+    return "\n".join([*lines, "", task.planned_scene.describe(), "", robot.describe()])
 
 
 def _segments(task: Task) -> list[str]:

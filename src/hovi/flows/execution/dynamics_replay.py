@@ -21,7 +21,7 @@ from hovi.errors import InputError
 from hovi.robot.frame_distance import FrameDistance
 from hovi.robot.mass_matrix import MassMatrix
 from hovi.robot.robot import Robot
-from hovi.scene.scene import Scene
+from hovi.scene.scene import Scene, without_inertia
 from hovi.system.dataclass import dataclass
 from hovi.system.deadline import raise_if_late
 
@@ -79,6 +79,8 @@ def replay_dynamics(trajectory: Trajectory, frame: str | None = None) -> Dynamic
     Raises InputError with the reason if this is not possible.
     """
     robot, parts = _parts_of(trajectory)
+    if bare := without_inertia(parts[0][0]):
+        raise InputError(f"there is no inertia at joint {bare}")
     robot.measured_frames(
         frame
     )  # raises for a frame that is unknown or fixed, before the integration

@@ -179,6 +179,20 @@ class Limits(LimitsSummary):
         return self.on_rates and bool(self.bounded[KINDS.index("torque_rate")].any())
 
     @property
+    def on_torques(self) -> bool:
+        """Whether there is a limit on tau or on d tau / dt."""
+        return bool(self.bounded[KINDS.index("tau")].any()) or self.on_torque_rate
+
+    @property
+    def without_torques(self) -> Limits:
+        """The same without limits on tau and on d tau / dt."""
+        lower, upper = self.lower.copy(), self.upper.copy()
+        for row, kind in enumerate(self.kinds):
+            if kind in ("tau", "torque_rate"):
+                lower[row], upper[row] = -np.inf, np.inf
+        return self._between(lower, upper)
+
+    @property
     def first_kinds(self) -> Limits:
         """The limits on q, v, a and tau alone."""
         return self._between(self.lower[:FIRST_KINDS], self.upper[:FIRST_KINDS])

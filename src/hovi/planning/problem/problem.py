@@ -31,7 +31,7 @@ from hovi.planning.problem.hessian_structure import ActionStructure
 from hovi.planning.problem.limits import Limits, no_limits
 from hovi.planning.problem.node_conditions import NodeCondition
 from hovi.planning.problem.notation.summaries import ProblemSummary
-from hovi.planning.problem.notation.supported import require_supported
+from hovi.planning.problem.notation.supported import require_dynamics, require_supported
 from hovi.planning.problem.seams import Hold, ViaPoints, curve_through, holding
 from hovi.planning.problem.torque_moments import TorqueMoments
 from hovi.planning.problem.way_back.end_state import EndState
@@ -40,7 +40,7 @@ from hovi.robot.mass_matrix import MassMatrix
 from hovi.robot.robot import Robot
 from hovi.robot.space.coordinates import Coordinates
 from hovi.scene.jerk_lagrangian import JerkLagrangian
-from hovi.scene.scene import Scene, require_plannable
+from hovi.scene.scene import Scene
 from hovi.scene.segment_scenes import SegmentScenes
 from hovi.scene.segmented_lagrangian import SegmentedLagrangian
 from hovi.schemes import require_regular
@@ -97,8 +97,7 @@ class TrajectoryProblem(ProblemSummary):
         of, limits = self.ld.lagrangian, self.limits
         if limits is not None and limits.on_torque_rate and isinstance(of, JerkLagrangian):
             object.__setattr__(self, "ld", DiscreteLagrangian(of.with_torque_rates(), self.grid))
-        for scene in self.scenes:
-            require_plannable(scene)
+        require_dynamics(self)
         if len(self.passive) > 0 and len(self.ld.lagrangian.output_weight) == 0:
             raise InputError("passive joints need a Lagrangian of torques: leave them out.")
         first, last = self.start, self.goal

@@ -105,7 +105,7 @@ def whirl(solution: Solution) -> Whirl | None:
     """The light joint without a velocity limit that whirls most; None if none does."""
     problem, trajectory = solution.problem, solution.trajectory
     assert problem is not None
-    if not problem.about_robot:
+    if not (problem.about_robot and problem.ld.lagrangian.needs_torques):
         return None
     joints, q = np.flatnonzero(_unlimited_angles(problem)), trajectory.q
     if len(joints) == 0:

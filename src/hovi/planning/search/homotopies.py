@@ -65,6 +65,8 @@ def lighter_rotors(job: Job) -> list[Stage]:
 
     Torque limits apply in the last stage only.
     """
+    if not job.lagrangian().needs_torques:
+        return []  # rotors change no cost
     robot = job.scene.robot
     q, _ = job.start.on(robot, "start")
     M = MassMatrix(job.scene.model)(q[None])[0]

@@ -20,13 +20,17 @@ from hovi.planning.problem.limits import Limits, as_limits
 from hovi.planning.problem.presolve.formulas_of_time import graded
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.problem.tolerance import LAST_BARRIER, Tolerance
+from hovi.planning.refinement.adaptive import first_grid
 from hovi.planning.search.options import PlanOptions
 from hovi.planning.solver.initial_path import guess_path
 from hovi.scene.lagrangian import Lagrangian
 from hovi.scene.scene import Scene
 from hovi.scene.segmented_lagrangian import SegmentedLagrangian
+from hovi.schemes import is_galerkin, of_order
 from hovi.system.dataclass import dataclass
 
+MAX_GUESS_INTERVALS = 400
+"""Largest number of intervals of a guess on whose grid a refinement begins."""
 MAX_CHART_INTERVALS = 2000
 """Maximum number of intervals after halving for the orientations of the initial guess."""
 
@@ -185,3 +189,35 @@ def split_for_charts(job: Job, guess: str | Trajectory) -> Job:
             if 2 * job.grid.intervals > MAX_CHART_INTERVALS:
                 raise
         job = job.on(job.grid.halved())
+
+
+def grid_of(T: float, options: PlanOptions, scene: Scene, free: bool) -> Grid:
+    """The requested grid, or the first grid of the refinement to a tolerance.
+
+    The latter is the guess's own grid if that is a finer one, so that the guess is not coarsened.
+    free: whether the duration is.
+    """
+    guess = options.guess
+    if options.tolerance is None:
+        grid = Grid.uniform(T, options.interval_count, of_order(options.table, scene.order))
+    elif isinstance(guess, Trajectory) and _is_first_grid(guess.grid, options, scene.order):
+        grid = guess.grid.stretched(T)
+    else:
+        limited = as_limits(scene.robot, options.limits).bounded.any()
+        kinks = limited or options.clearance.wanted or options.via
+        few = options.starts == 1 and not free and not isinstance(guess, Trajectory)
+        number, order = options.interval_count, scene.order
+        grid = first_grid(T, number, not kinks, more_points=not few, order=order)
+    return grid.with_nodes(sorted(each.time for each in options.via), options.intervals is None)
+
+
+def _is_first_grid(grid: Grid, options: PlanOptions, order: int) -> bool:
+    """Whether a refinement begins on the grid of its guess.
+
+    The grid has Galerkin tables only, and more intervals than the first grid would have, up to
+    MAX_GUESS_INTERVALS; neither intervals nor via points ask for others. order: of the Lagrangian.
+    """
+    if options.intervals is not None or options.via or grid.order != order:
+        return False
+    refinable = all(is_galerkin(scheme) for scheme, _ in grid.groups)
+    return refinable and options.interval_count < grid.intervals <= MAX_GUESS_INTERVALS

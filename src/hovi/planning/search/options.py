@@ -18,6 +18,7 @@ from hovi.planning.obstacles.obstacle import Obstacle
 from hovi.planning.obstacles.preparation import prepared_within
 from hovi.planning.problem.goals import Via
 from hovi.planning.problem.limits import Limits, as_limits
+from hovi.planning.problem.notation.objective import IN_WORDS, require_objective
 from hovi.planning.problem.notation.via_points import as_via
 from hovi.planning.problem.tolerance import Tolerance
 from hovi.planning.problem.units import as_time_limit
@@ -30,7 +31,7 @@ from hovi.planning.search.option_fields import (
     whole_number,
 )
 from hovi.robot.robot import Robot
-from hovi.scene.scene import Scene
+from hovi.scene.scene import Scene, without_inertia
 from hovi.schemes import Scheme, by_name
 from hovi.system.dataclass import dataclass
 
@@ -167,6 +168,14 @@ class PlanOptions:
         "weight of each joint's torque in the cost, shape (nv,), in place of that of the scene's "
         "effect EffortWeight, if it has one, which the message says then.",
     )
+    objective: str = option(
+        "effort",
+        'what is minimised: "effort", by the effects of the scene as they are; "acceleration" or '
+        '"jerk", the integral of half its square, which needs no torques; "time", the least '
+        "duration between two bounds. An objective is nothing but effects with their weights, "
+        "which `hovi info` prints.",
+        SceneKey(IN_WORDS),
+    )
     smooth: bool = option(
         False,
         "whether to add a cost on the jerk, whose weight follows from inertia and duration, so "
@@ -203,6 +212,7 @@ class PlanOptions:
         if isinstance(self.scheme, Mapping):
             self._take_scheme_table(self.scheme)
         check_numbers(self)
+        require_objective(self.objective)
         if isinstance(self.guess, str):
             require_guess(self.guess)
         _ = self.time_limit_seconds  # raises for one that is not positive
@@ -313,15 +323,23 @@ class PlanOptions:
         options.__dict__["clearance"] = clearance
         return options
 
+    def order_of(self, scene: Scene) -> int:
+        """The order of the Lagrangian of a motion in a scene: 3 with a cost on the jerk."""
+        return 3 if self.smooth or self.objective == "jerk" else scene.order
+
     def on(self, scene: Scene) -> Self:
         """These options with limits and tolerance resolved for a scene's robot, with defaults.
+
+        A robot without inertia has no limits on torques, as it has none.
 
         Raises InputError for values that do not fit the robot.
         """
         tolerance, robot = self.effective_tolerance, scene.robot
         if tolerance is not None:
             tolerance = Tolerance.of(tolerance, robot)
-        limits = as_limits(robot, self.limits, 3 if self.smooth else scene.order)
+        limits = as_limits(robot, self.limits, self.order_of(scene))
+        if limits.on_torques and without_inertia(scene):
+            limits = limits.without_torques
         return self.with_changes(limits=limits, tolerance=tolerance)
 
 

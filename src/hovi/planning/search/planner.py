@@ -3,38 +3,37 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, ParamSpec, Protocol, cast
 
 from hovi.checks.arguments import check_arguments_except
-from hovi.discrete.grid import Grid
 from hovi.discrete.output.caution import COLLISION, LEFT_OUT, STATUS, WARNED, Caution
 from hovi.discrete.state import State, warn_of_degrees
-from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError, ModelError, SceneError, expect, warn
 from hovi.planning.clearance.distances import distances_between
 from hovi.planning.clearance.hull_overlaps import HullOverlap, hull_overlaps, met_sentence
 from hovi.planning.clearance.self_collisions import not_looked_at, pairs_left_out
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.goals import Via
-from hovi.planning.problem.limits import as_limits
 from hovi.planning.problem.notation.ends import End, as_end
+from hovi.planning.problem.notation.objective import with_objective
+from hovi.planning.problem.notation.smoothing import smoothed
 from hovi.planning.problem.presolve.assumptions import assumptions
 from hovi.planning.problem.presolve.findings import findings
 from hovi.planning.problem.presolve.length_slips import grasped_slips
 from hovi.planning.problem.units import Duration, as_duration
-from hovi.planning.refinement.adaptive import first_grid
 from hovi.planning.refinement.faults.cautions import keeping_warnings, with_cautions_of_motion
 from hovi.planning.search.branch_choice import Ends, chosen_ends, nearest_ends
 from hovi.planning.search.final_stages import on_grid_of
 from hovi.planning.search.free_duration import FreeDuration
 from hovi.planning.search.group import in_group, with_others
-from hovi.planning.search.job import Job, split_for_charts
+from hovi.planning.search.job import Job, grid_of, split_for_charts
+from hovi.planning.search.least_duration import least_duration
 from hovi.planning.search.option_fields import spell_out
 from hovi.planning.search.options import PlanOptions
 from hovi.planning.search.search import Search
-from hovi.planning.search.smoothing import smoothed
 from hovi.planning.solver.outcome.self_collision import self_collision_sentence
 from hovi.planning.solver.outcome.without_solve import without_search
 from hovi.planning.solver.solver import Solution
@@ -42,15 +41,12 @@ from hovi.planning.solver.status import Status
 from hovi.robot.robot import Robot
 from hovi.robot.space.angle_ranges import LOOKS_LIKE_DEGREES
 from hovi.scene.scene import Scene
-from hovi.schemes import is_galerkin, of_order
 from hovi.system.blas_threads import one_blas_thread
 from hovi.system.dataclass import dataclass
 from hovi.system.deadline import Deadline
 from hovi.system.interruption import interruptible
 from hovi.system.progress import Progress, shows_progress, silent
 
-MAX_GUESS_INTERVALS = 400
-"""Largest number of intervals of a guess on whose grid a refinement begins."""
 Keywords = ParamSpec("Keywords")
 UNSEEN = Status.INFEASIBLE, Status.DIVERGED, Status.TIME_LIMIT
 """Statuses of motions in which self-collision is not looked for."""
@@ -135,9 +131,28 @@ def plan(
     if options.group is not None:
         scene, start_end, goal_end = in_group(scene, options.group, *given)
         given = start_end, goal_end
+    scene = aiming(scene, options)
+    if options.objective == "time":
+        whole = functools.partial(_planned, scene, *given, as_duration(duration), progress)
+        return least_duration(whole, as_duration(duration), options)
+    return _planned(scene, *given, as_duration(duration), progress, options, began)
+
+
+def _planned(
+    scene: Scene,
+    start: State | FrameGoal,
+    goal: State | FrameGoal,
+    duration: float | tuple[float, float],
+    progress: Progress | None,
+    options: PlanOptions,
+    began: float | None = None,
+) -> Solution:
+    """The motion in a scene that has what is grasped and the objective. began: by the clock."""
+    began = time.perf_counter() if began is None else began
+    given = start, goal
     chosen, apart = kept_apart(options.on(scene), scene.robot, ends_of(*given, options.via))
     deadline = Deadline(chosen.time_limit_seconds)
-    free, T = _time(scene, as_duration(duration), chosen)
+    free, T = _time(scene, duration, chosen)
     search = _Planning(scene, *given, T, chosen, free)
     job = search.job(nearest_ends(scene, *given, chosen), deadline)
     for bound in () if free is None else (free.lower, free.upper):
@@ -285,6 +300,11 @@ def holding(scene: Scene, options: PlanOptions) -> Scene:
     return scene_holding(scene, tuple(options.grasped))
 
 
+def aiming(scene: Scene, options: PlanOptions) -> Scene:
+    """The scene with the effects of the objective."""
+    return with_objective(scene, options.objective, options.weight is not None)
+
+
 @dataclass(frozen=True, eq=False)
 class _Planning:
     """What jobs are made of: see `plan`. duration: of the first solve, in [s]."""
@@ -303,7 +323,7 @@ class _Planning:
         T, options = self.duration, self.options
         if scene is None:
             scene = smoothed(self.scene, *ends, T) if options.smooth else self.scene
-        grid = _grid(T, options, scene, self.free is not None)
+        grid = grid_of(T, options, scene, self.free is not None)
         with deadline.in_force():
             scene.effort_lagrangian(options.weight)  # its functions may have to be compiled
             job = Job(scene, grid, *ends, options)
@@ -336,38 +356,6 @@ def _time(
             "allow; give the duration as one number."
         )
     return free, free.first
-
-
-def _grid(T: float, options: PlanOptions, scene: Scene, free: bool) -> Grid:
-    """The requested grid, or the first grid of the refinement to a tolerance.
-
-    The latter is the guess's own grid if that is a finer one, so that the guess is not coarsened.
-    free: whether the duration is.
-    """
-    guess = options.guess
-    if options.tolerance is None:
-        grid = Grid.uniform(T, options.interval_count, of_order(options.table, scene.order))
-    elif isinstance(guess, Trajectory) and _is_first_grid(guess.grid, options, scene.order):
-        grid = guess.grid.stretched(T)
-    else:
-        limited = as_limits(scene.robot, options.limits).bounded.any()
-        kinks = limited or options.clearance.wanted or options.via
-        few = options.starts == 1 and not free and not isinstance(guess, Trajectory)
-        number, order = options.interval_count, scene.order
-        grid = first_grid(T, number, not kinks, more_points=not few, order=order)
-    return grid.with_nodes(sorted(each.time for each in options.via), options.intervals is None)
-
-
-def _is_first_grid(grid: Grid, options: PlanOptions, order: int) -> bool:
-    """Whether a refinement begins on the grid of its guess.
-
-    The grid has Galerkin tables only, and more intervals than the first grid would have, up to
-    MAX_GUESS_INTERVALS; neither intervals nor via points ask for others. order: of the Lagrangian.
-    """
-    if options.intervals is not None or options.via or grid.order != order:
-        return False
-    refinable = all(is_galerkin(scheme) for scheme, _ in grid.groups)
-    return refinable and options.interval_count < grid.intervals <= MAX_GUESS_INTERVALS
 
 
 def _goal(goal: End, robot: Robot, options: PlanOptions) -> State | FrameGoal:

@@ -14,8 +14,8 @@ import numpy.typing as npt
 
 from hovi.discrete.state import State
 from hovi.effects import Effect
+from hovi.planning.problem.notation.smoothing import smoothed
 from hovi.planning.search.job import Acting, Part
-from hovi.planning.search.smoothing import smoothed
 from hovi.planning.sequence.branches import End, Leg
 from hovi.planning.sequence.segment import Segment
 from hovi.robot.robot import Robot

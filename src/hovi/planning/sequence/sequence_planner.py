@@ -18,6 +18,7 @@ from hovi.planning.search.job import Acting
 from hovi.planning.search.option_fields import spell_out
 from hovi.planning.search.options import PlanOptions
 from hovi.planning.search.planner import (
+    aiming,
     ends_of,
     holding,
     kept_apart,
@@ -116,7 +117,12 @@ def plan_sequence(
     parts = checked_segments(segments, chosen)
     if len(parts) == 1:
         return _alone(scene, start, parts[0], progress, chosen)
+    if chosen.objective == "time":
+        raise InputError(
+            'objective = "time" needs a free duration, and those of segments are fixed.'
+        )
     scene, begin, goals = _in_group(holding(scene, chosen), start, parts, chosen)
+    scene = aiming(scene, chosen)
     deadline = Deadline(chosen.time_limit_seconds)
     names = (f"the goal of {name!r}" for name in names_of(parts))
     stops = ends_of(begin, None, chosen.via) | dict(zip(names, goals, strict=True))

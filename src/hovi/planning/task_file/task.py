@@ -12,6 +12,7 @@ from hovi.discrete.state import State
 from hovi.errors import InputError, warn
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.notation.ends import as_end
+from hovi.planning.problem.notation.objective import with_objective
 from hovi.planning.problem.units import as_duration
 from hovi.planning.search.option_fields import option_infos
 from hovi.planning.search.options import PlanOptions
@@ -118,6 +119,12 @@ class Task(Summarized):
         from hovi.planning.obstacles.grasped import scene_holding  # 10 ms
 
         return scene_holding(self.scene, tuple(self.options.grasped))
+
+    @property
+    def planned_scene(self) -> Scene:
+        """The scene with what its robot holds, and with the effects of the objective."""
+        options = self.options
+        return with_objective(self.held_scene, options.objective, options.weight is not None)
 
     @property
     def start_state(self) -> State:

@@ -93,7 +93,7 @@ class GuessCosts:
 
         Where an end of the task is a frame's target, the end of the guess stays.
         """
-        scene, grid, path = task.held_scene, guess.grid, guess.path
+        scene, grid, path = task.planned_scene, guess.grid, guess.path
         try:
             robot = scene.robot
             ends = _end(task.start, guess, 0, robot), _end(task.goal, guess, -1, robot)

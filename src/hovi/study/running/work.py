@@ -225,7 +225,9 @@ def _solved(task: Task, job: CellJob, desk: _Desk) -> tuple[Solution, str | None
 def _guesses(task: Task, job: CellJob, desk: _Desk) -> list[tuple[str, Trajectory]]:
     """The motions of parents with their keys. Raises StorageError: the fault is not the cell's."""
     try:
-        read = [(each.key, desk.motions.get(each.motion, task.held_scene)) for each in job.guesses]
+        read = [
+            (each.key, desk.motions.get(each.motion, task.planned_scene)) for each in job.guesses
+        ]
     except (OSError, ValueError, HoviError) as error:
         raise StorageError(f"the motion of a parent could not be read: {error}") from error
     return [(key, motion) for key, motion in read if motion is not None]

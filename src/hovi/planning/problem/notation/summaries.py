@@ -39,6 +39,11 @@ class ProblemSummary(Summarized):
     via: tuple[Any, ...]
     clearance: Any
 
+    @property
+    def scenes(self) -> tuple[Any, ...]:
+        """The scene of every segment; none without a robot."""
+        raise NotImplementedError
+
     def _summary(self) -> Summary:
         limited = self.limits is not None and self.limits._summary().rows
         rows = [

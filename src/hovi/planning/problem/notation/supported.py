@@ -1,10 +1,11 @@
-"""What problems of an order of the Lagrangian support."""
+"""What problems of an order of the Lagrangian support, and of a robot without inertia."""
 
 from __future__ import annotations
 
 from hovi.errors import InputError
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.notation.summaries import ProblemSummary
+from hovi.scene.scene import require_plannable
 
 LIMITED_ORDERS = 2, 3
 """Orders of the Lagrangians whose problems may have limits, obstacles, via points and frames."""
@@ -27,3 +28,17 @@ def require_supported(problem: ProblemSummary, order: int) -> None:
         )
     if limits is not None:
         limits.require_order(order)
+
+
+def require_dynamics(problem: ProblemSummary) -> None:
+    """Raise ModelError for a robot that has not what is asked of it: moving joints, and torques."""
+    for scene in problem.scenes:
+        require_plannable(scene, needs_torques(problem))
+
+
+def needs_torques(problem: ProblemSummary) -> bool:
+    """Whether torques are part of the cost, are bounded, or vanish at passive joints."""
+    limits = problem.limits
+    bounded = limits is not None and limits.on_torques
+    passive = any(scene.passive for scene in problem.scenes)
+    return bounded or passive or problem.ld.lagrangian.needs_torques

@@ -6,7 +6,7 @@ import numpy as np
 
 from hovi.discrete.trajectory import Trajectory
 from hovi.robot.space.joint_kinds import FLOATING, kind_of
-from hovi.scene.scene import Scene
+from hovi.scene.scene import Scene, without_inertia
 
 SAMPLES = 257
 """Number of samples of a motion at which the force on a base is compared."""
@@ -23,6 +23,9 @@ def assumptions(
         that the scene does not know, and that replace those of its effect.
     """
     keys = {effect.key for effect in scene.effects}
+    bare = without_inertia(scene)
+    if bare and not scene.effort_lagrangian(regular=False).needs_torques:
+        return [f"Torques, and limits on them, are left out: there is no inertia at joint {bare}."]
     sentences = [] if "gravity" in keys else ["Gravity is left out, as the scene does not name it."]
     sentences += _driven_base(scene, motion)
     if weighted and "effort_weight" in keys:

@@ -28,7 +28,7 @@ NEARLY_AT_REST = 0.05
 """Velocity, in [rad/s] or [m/s], up to which a motion is taken as at rest."""
 KEPT_OPTIONS = (
     *("duration", "time_weight", "tolerance", "scheme", "intervals", "limits", "via", "weight"),
-    *("smooth", "obstacles", "grasped", "margin", "self_collision", "group", "turns"),
+    *("objective", "smooth", "obstacles", "grasped", "margin", "self_collision", "group", "turns"),
     *("starts", "continuation", "processes"),
 )
 """Options of `plan` that `replan` and `advance` keep, or have no use for."""
