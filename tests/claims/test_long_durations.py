@@ -11,7 +11,7 @@ ENDS = [0.3, -1.1, 0.9, 0.4, -0.5, 0.2], [-0.5, -0.8, 1.2, -0.4, 0.3, 0.8]
 SAID = r"the period of ([\d.]+) s in which the robot swings"
 
 
-def ur5(*effects: hovi.Effect) -> hovi.Scene:
+def ur5(*effects: hovi.effects.Effect) -> hovi.Scene:
     return hovi.Scene(hovi.load_robot("ur5"), effects)
 
 

@@ -16,7 +16,7 @@ from hovi.checks.shapes import require_shape
 from hovi.errors import InputError, nearest, warn
 from hovi.planning.problem.arms.limit_set import KIND_NAMES, OF_ORDER_3, is_limit_set, limit_set
 from hovi.planning.problem.arms.limit_set import NAMES as ARMS
-from hovi.planning.problem.arms.urdf_ranges import require_ranges, soft_ranges
+from hovi.planning.problem.arms.urdf_ranges import position_ranges, require_ranges
 from hovi.planning.problem.notation.limit_entries import entries, number_in
 from hovi.planning.problem.notation.summaries import LimitsSummary
 from hovi.planning.problem.way_back.excused import Excused, widening
@@ -186,11 +186,8 @@ class Limits(LimitsSummary):
     @property
     def without_torques(self) -> Limits:
         """The same without limits on tau and on d tau / dt."""
-        lower, upper = self.lower.copy(), self.upper.copy()
-        for row, kind in enumerate(self.kinds):
-            if kind in ("tau", "torque_rate"):
-                lower[row], upper[row] = -np.inf, np.inf
-        return self._between(lower, upper)
+        of = np.isin(self.kinds, ("tau", "torque_rate"))[:, None]
+        return self._between(np.where(of, -np.inf, self.lower), np.where(of, np.inf, self.upper))
 
     @property
     def first_kinds(self) -> Limits:
@@ -296,14 +293,7 @@ def urdf_limits(robot: Robot, soft: bool = False) -> Limits:
     """
     shape = (FIRST_KINDS, robot.nv)
     lower, upper = np.full(shape, -np.inf), np.full(shape, np.inf)
-    if not robot.unplanned_joints:
-        iq, iv = robot.space.plain
-        lower[0, iv], upper[0, iv] = robot.lower[iq], robot.upper[iq]
-    for name, pair in soft_ranges(robot).items() if soft else ():
-        i = robot.coordinate_names.index(name)
-        lower[0, i], upper[0, i] = pair
-    empty = lower[0] >= upper[0]
-    lower[0, empty], upper[0, empty] = -np.inf, np.inf
+    lower[0], upper[0] = position_ranges(robot, soft)
     for row, size in ((1, robot.velocity_limit), (3, robot.effort_limit)):
         bound = np.where(size > 0, size, np.inf)
         lower[row], upper[row] = -bound, bound

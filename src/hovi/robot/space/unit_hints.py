@@ -12,6 +12,8 @@ from collections.abc import Iterator
 import numpy as np
 import pinocchio as pin
 
+from hovi.robot.space.joint_kinds import LENGTH, kind_of
+
 LONG = 50.0
 """A range of a sliding joint, in [m], from which it looks like millimetres."""
 DENSE = 10_000.0
@@ -27,9 +29,13 @@ LEAST_SIZE = 0.05
 def unit_hints(model: pin.Model) -> Iterator[str]:
     """Hints at units, as clauses: one about each kind, with the joint that is furthest off."""
     sliding = [
-        (float(model.upperPositionLimit[joint.idx_q] - model.lowerPositionLimit[joint.idx_q]), name)
+        (
+            float(model.upperPositionLimit[joint.idx_q])
+            - float(model.lowerPositionLimit[joint.idx_q]),
+            name,
+        )
         for joint, name in zip(model.joints[1:], model.names[1:], strict=True)
-        if joint.nq == joint.nv == 1 and joint.shortname().startswith("JointModelP")
+        if kind_of(joint).units == (LENGTH,)
     ]
     if found := max(((x, name) for x, name in sliding if LONG <= x < 1e6), default=None):
         yield (

@@ -40,7 +40,23 @@ def require_ranges(robot: Robot, others: Collection[int] = ()) -> None:
     )
 
 
-def soft_ranges(robot: Robot) -> dict[str, Range]:
+def position_ranges(robot: Robot, soft: bool = False) -> tuple[Array, Array]:
+    """The ranges of positions of the URDF, infinite where there is none or an empty one, (nv,) each.
+
+    soft: whether joints have those of their safety controllers.
+    """
+    lower, upper = np.full(robot.nv, -np.inf), np.full(robot.nv, np.inf)
+    if not robot.unplanned_joints:
+        iq, iv = robot.space.plain
+        lower[iv], upper[iv] = robot.lower[iq], robot.upper[iq]
+    for name, pair in _soft_ranges(robot).items() if soft else ():
+        i = robot.coordinate_names.index(name)
+        lower[i], upper[i] = pair
+    empty = lower >= upper
+    return np.where(empty, -np.inf, lower), np.where(empty, np.inf, upper)
+
+
+def _soft_ranges(robot: Robot) -> dict[str, Range]:
     """The ranges of safety controllers that lie inside those of the joints, by coordinate.
 
     Of joints with one position. A controller whose soft limits are both zero,

@@ -29,7 +29,7 @@ TIGHT = 0.8
 """Least share of its time that the least time of a travel takes where its ramps get nodes."""
 GRADES = 2.0 ** np.arange(-2, 12)
 """Times of nodes, as multiples of a ramp, until they are as far apart as those of the grid."""
-SMOOTH_GRADES = np.union1d(2.0 ** np.arange(-3, 12), [0.75, 0.875])
+SMOOTH_GRADES = np.sort([*2.0 ** np.arange(-3, 12), 0.75, 0.875])
 """The same where the acceleration is continuous, and has to vanish after a ramp as well."""
 CLOSE = 1e-6
 """Share of the duration within which two nodes are one."""

@@ -13,8 +13,6 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
-from scipy.linalg import LinAlgError, eigvals
-from scipy.optimize import minimize
 
 from hovi.planning.problem.problem import TrajectoryProblem
 
@@ -76,6 +74,8 @@ class _Static:
 
     def least(self, q: Array) -> Array:
         """A configuration within the limits of least cost at rest, from another, (nq,)."""
+        from scipy.optimize import minimize
+
         bounds, options = list(zip(self.lower, self.upper, strict=True)), {"maxiter": MAX_STEPS}
         begin = np.clip(q, self.lower, self.upper)
         found = minimize(
@@ -85,6 +85,8 @@ class _Static:
 
     def swings(self, q: Array) -> npt.NDArray[np.complex128]:
         """All lambda at a configuration, of the joints that are not at a limit."""
+        from scipy.linalg import LinAlgError, eigvals
+
         hessian = np.asarray(self.lagrangian.evaluate(q[None], *self.none)[2])[0]
         free = np.flatnonzero((q > self.lower) & (q < self.upper))
         n, k = len(free), len(self.none)
