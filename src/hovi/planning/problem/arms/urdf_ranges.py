@@ -41,7 +41,7 @@ def require_ranges(robot: Robot, others: Collection[int] = ()) -> None:
 
 
 def position_ranges(robot: Robot, soft: bool = False) -> tuple[Array, Array]:
-    """The ranges of positions of the URDF, infinite where there is none or an empty one, (nv,) each.
+    """The ranges of positions of the URDF, (nv,) each; infinite without one and for empty ones.
 
     soft: whether joints have those of their safety controllers.
     """
