@@ -301,23 +301,28 @@ def _cost_of_difference(
 ) -> Array:
     """1/2 int dtau^T R dtau over each interval, shape (N,), with dtau the difference of torques.
 
-    If no torque has a weight: `difference`, shared out in proportion to those with R = 1.
+    If no torque has a weight: `difference`, shared out in proportion to the same integrals of the
+    accelerations.
     difference: of the two costs.
     """
     ld, coarse = problem.ld, problem.trajectory(path)
     N = coarse.grid.intervals
     k, s = sample_points(coarse)
     t = np.clip(times_of(coarse, k, s), 0.0, finer.duration)
-    squares = (coarse.sample_intervals(k, s).tau - finer.sample(t).tau) ** 2
-    parts = squares.reshape(N, len(squares) // N, -1).mean(axis=1)
+    one, other = coarse.sample_intervals(k, s), finer.sample(t)
+    a, parts = (
+        (x**2).reshape(N, len(x) // N, x.shape[1]).mean(axis=1)
+        for x in (one.a - other.a, one.tau - other.tau)
+    )
     by_joint, weights = 0.5 * coarse.grid.steps[:, None] * parts, np.zeros_like(parts)
     for batch, lagrangian in zip(ld.interval_batches, ld.lagrangians, strict=False):
         R = lagrangian.output_weight[: parts.shape[1]]  # of torques, before those of their rates
         weights[batch.numbers, : len(R)] = R
     if weights.any():
         return np.asarray(np.vecdot(by_joint, weights))
-    gains = by_joint.sum(axis=1)
-    return np.asarray(gains * (difference / max(float(gains.sum()), np.finfo(float).tiny)))
+    gains = coarse.grid.steps * a.sum(axis=1)
+    shares = gains / max(float(gains.sum()), np.finfo(float).tiny)
+    return np.asarray(difference * shares)
 
 
 def prolonged(path: DiscretePath, fine: Grid) -> DiscretePath:
