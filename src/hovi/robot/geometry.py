@@ -18,9 +18,10 @@ import pinocchio as pin
 
 from hovi.errors import ModelError
 from hovi.robot.example_robots import example_robot
+from hovi.robot.formats.packages import holds_all_files, package_name
 from hovi.robot.meshes.mesh_shape import MeshShape, mesh_shape
 from hovi.robot.model import build_full_model, couplings_in, locked_and_coupled
-from hovi.robot.source import RobotSource, holds_all_files
+from hovi.robot.source import RobotSource
 from hovi.robot.urdf.check import checked_urdf
 from hovi.robot.urdf.mesh_files import check_mesh, is_inside
 from hovi.robot.urdf.normalize import make_plain
@@ -94,9 +95,9 @@ def _candidates(filename: str, source: RobotSource) -> Iterator[tuple[Path, Path
     scheme, _, rest = filename.rpartition("://")
     if scheme in ("package", "model"):
         rest = rest.lstrip("/")
-        package = rest.split("/", 1)[0]
+        package, _, rest = rest.partition("/")
         for folder in _package_folders(package, source):
-            yield folder, Path(os.path.normpath(folder.parent / rest))
+            yield folder, Path(os.path.normpath(folder / rest))
         return
     path = Path(rest)
     pairs = [(Path(folder), Path(folder)) for folder in source.package_dirs]
@@ -115,7 +116,7 @@ def _package_root(folder: Path) -> Path:
 
 
 def _package_folders(package: str, source: RobotSource) -> Iterator[Path]:
-    """Folders named `package`: in the package folders, or around the URDF file."""
+    """Folders of a package, by their names: in the package folders, or around the URDF file."""
     for parent in _package_dirs(source):
         yield parent.absolute() / package
         if parent.name == package:
@@ -124,7 +125,7 @@ def _package_folders(package: str, source: RobotSource) -> Iterator[Path]:
         # Any other folder above may be a home folder, and its files nobody's to show.
         folder = Path(source.folder).absolute()
         around = (p for p in folder.parents if (p / "package.xml").is_file())
-        yield from (p for p in (folder, *around) if p.name == package)
+        yield from (p for p in (folder, *around) if package in (p.name, package_name(p)))
 
 
 def _package_dirs(source: RobotSource) -> list[Path]:

@@ -16,7 +16,7 @@ from hovi.robot.example_robots import BUILT_IN_CODE, build_in_code, example_robo
 from hovi.robot.formats.descriptions import description_of
 from hovi.robot.formats.mjcf import model_of_mjcf
 from hovi.robot.formats.recognized import format_of
-from hovi.robot.formats.xacro import urdf_of_xacro
+from hovi.robot.formats.xacro import as_arguments, urdf_of_xacro
 from hovi.robot.mimic_model import Coupling
 from hovi.robot.mimic_tags import held_values, read_couplings
 from hovi.robot.model import build_full_model, build_model, locked_model
@@ -56,13 +56,16 @@ def file_source(
     free_flyer: bool,
     srdf: Path | None = None,
     mimic: bool = False,
+    xacro_args: Mapping[str, str] | None = None,
 ) -> RobotSource:
     """The source of a URDF or xacro file and an SRDF file.
 
     Raises ModelError if one cannot be read.
     """
-    is_xacro = format_of(path) == "xacro"
-    text = urdf_of_xacro(path, package_dirs) if is_xacro else read_urdf(path)
+    if format_of(path) == "xacro":
+        text, package_dirs = urdf_of_xacro(path, package_dirs, xacro_args or {})
+    else:
+        text = read_urdf(path)
     _warn_of_loops(text, path.name)
     return RobotSource(
         kind="urdf",
@@ -149,7 +152,7 @@ def _led(urdf: str, name: str, held: Mapping[str, float]) -> list[Coupling]:
     return [coupling for coupling in couplings if coupling.leader in held]
 
 
-@check_arguments_except("x", "mimic", "free_flyer", "locked", "package_dirs")
+@check_arguments_except("x", "mimic", "free_flyer", "locked", "package_dirs", "xacro_args")
 def load_robot(
     x: str | Path | pin.Model,
     *,
@@ -160,13 +163,15 @@ def load_robot(
     collision: pin.GeometryModel | None = None,
     srdf: str | Path | None = None,
     mimic: bool = False,
+    xacro_args: Mapping[str, Any] | None = None,
 ) -> Robot:
     """Load a robot. Models that do not support planning load as well; the problem refuses them.
 
     x: path of a URDF, xacro or MJCF file; or a name of example-robot-data, such as "panda", or of
         robot_descriptions, such as "ur10e_description"; or a pinocchio.Model, which is copied. A
         string with a separator or ending in .urdf is a path. See docs/robots.md.
-    package_dirs: folders in which `package://` meshes are looked up.
+    package_dirs: folders in which `package://` meshes, and the packages of a xacro file, are looked
+        up; a xacro file finds those of its own source tree by itself.
     free_flyer: whether the base floats; by default it is fixed, or as the example's loader says.
     locked: joints to fix at the neutral configuration, or a single name; or a mapping from joints
         to the positions at which they are fixed, in [rad] or [m], whose followers by <mimic> tags
@@ -175,6 +180,7 @@ def load_robot(
     srdf: path of an SRDF with named poses; by default an example robot uses its own.
     mimic: whether joints with a <mimic> tag follow their leaders, without coordinates of their own
         in q; otherwise they move freely. A pinocchio.Model has its own couplings.
+    xacro_args: values of a xacro file's arguments by name, as `name:=value` elsewhere.
     Raises ModelError for an unknown file or name, an invalid URDF, an unknown joint to lock;
     InputError for a mimic or free_flyer that is neither True nor False.
     """
@@ -188,10 +194,13 @@ def load_robot(
     if not isinstance(x, str | Path):
         raise ModelError(f"a robot is a path, a name or a pinocchio.Model, not {type(x).__name__}.")
     form = format_of(x)
+    given_args = as_arguments(xacro_args or {})
     if form == "description":
         found = description_of(str(x))
         x, folders = found.path, (*folders, *found.package_dirs)
         form = format_of(x)
+    if given_args and form != "xacro":
+        raise InputError(f"xacro_args are those of a xacro file, and {str(x)!r} is none.")
     if form == "sdf":
         raise ModelError(f"{str(x)!r} is SDF, which Pinocchio's wheel does not read: save a URDF.")
     if form == "mjcf":
@@ -200,7 +209,7 @@ def load_robot(
         model = found_model.model
         return _from_model(model, model.name, held, given, semantics, found_model.notes)
     if isinstance(x, Path) or is_path(x):
-        source = file_source(Path(x), folders, held, bool(free_flyer), semantics, mimic)
+        source = file_source(Path(x), folders, held, bool(free_flyer), semantics, mimic, given_args)
     elif x in BUILT_IN_CODE:
         model, *both = build_in_code(x)
         return _from_model(model, x, held, (both[0], both[1]), semantics)

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import hashlib
 import math
-import os
 from collections.abc import Mapping
-from contextlib import suppress
 from dataclasses import field
-from pathlib import Path
 from typing import Any, Literal, get_args
 
 from hovi.errors import ModelError
+from hovi.robot.formats.packages import holds_all_files
 from hovi.system.dataclass import dataclass
 
 SourceKind = Literal["urdf", "example", "model"]
@@ -110,24 +108,6 @@ class RobotSource:
             srdf=None if data.get("srdf") is None else _entry(data, "srdf", str),
             mimic="mimic" in data and _entry(data, "mimic", bool),
         )
-
-
-def holds_all_files(folder: str | Path) -> bool:
-    """Whether a folder is the root of the file system or another one above the home folder.
-
-    Links are followed, and bind mounts are noticed.
-    """
-    above = {Path(os.sep)}
-    with suppress(RuntimeError, OSError):  # a user without a home
-        above |= set(Path.home().resolve().parents)
-    return any(_is_same(Path(folder), each) for each in above)
-
-
-def _is_same(folder: Path, other: Path) -> bool:
-    try:
-        return folder.samefile(other)
-    except (OSError, ValueError):  # no folder at all, or a NUL in its name
-        return False
 
 
 def text_hash(text: str) -> str:

@@ -12,7 +12,8 @@ import pinocchio as pin
 import pytest
 
 import hovi
-from hovi.errors import HoviError, ModelError
+from hovi.cli.application import main
+from hovi.errors import HoviError, InputError, ModelError
 from hovi.robot.formats.recognized import format_of
 from samples.cubic_motion import cubic_motion
 
@@ -199,3 +200,107 @@ def test_a_free_joint_of_mjcf_is_a_base_that_floats(tmp_path: Path) -> None:
     robot = hovi.load_robot(tmp_path / "box.xml")
     assert (robot.nq, robot.nv) == (7, 6)
     assert robot.model.inertias[1].mass == 2.0
+
+
+# Arguments and packages of xacro
+
+ARM = """<robot name="$(arg name)" xmlns:xacro="http://www.ros.org/wiki/xacro">
+  <xacro:arg name="mass" default="3"/>
+  <xacro:arg name="flipped" default="false"/>
+  <xacro:include filename="$(find parts_description)/link.xacro"/>
+  <link name="base"/>
+  <xacro:part mass="$(arg mass)"/>
+  <joint name="turn" type="revolute">
+    <parent link="base"/><child link="part"/>
+    <axis xyz="0 0 ${-1 if '$(arg flipped)' == 'true' else 1}"/>
+    <limit lower="-1" upper="1" effort="10" velocity="2"/>
+  </joint>
+</robot>
+"""
+PART = """<robot xmlns:xacro="http://www.ros.org/wiki/xacro">
+  <xacro:macro name="part" params="mass">
+    <link name="part"><inertial><mass value="${mass}"/>
+      <inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>
+      <visual><geometry><mesh filename="package://parts_description/rod.obj"/></geometry></visual>
+    </link>
+  </xacro:macro>
+</robot>
+"""
+ROD = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
+
+
+def package(folder: Path, name: str, files: dict[str, str]) -> Path:
+    folder.mkdir(parents=True)
+    (folder / "package.xml").write_text(f"<package><name>{name}</name></package>")
+    for file, text in files.items():
+        (folder / file).write_text(text)
+    return folder
+
+
+@pytest.fixture
+def arm(tmp_path: Path) -> Path:
+    """A xacro file in a package, whose parts are in another one."""
+    pytest.importorskip("xacrodoc")
+    return package(tmp_path / "tree" / "robots" / "arm", "arm_description", {"arm.xacro": ARM})
+
+
+def test_arguments_are_given_and_packages_beside_the_file_are_found(arm: Path) -> None:
+    package(arm.parents[1] / "parts_description", "parts_description", {"link.xacro": PART})
+    (arm.parents[1] / "parts_description" / "rod.obj").write_text(ROD)
+    robot = hovi.load_robot(arm / "arm.xacro", xacro_args={"name": "ur", "mass": 5})
+    assert robot.name == "ur"
+    assert robot.model.inertias[1].mass == 5.0
+    assert robot.visual is not None
+    assert robot.visual.ngeoms == 1
+    turned = hovi.load_robot(arm / "arm.xacro", xacro_args={"name": "ur", "flipped": True})
+    assert turned.model.inertias[1].mass == 3.0
+    assert (
+        turned.source.sha256
+        != hovi.load_robot(
+            arm / "arm.xacro", xacro_args={"name": "ur", "flipped": False}
+        ).source.sha256
+    )
+
+
+def test_what_is_missing_is_said_once_and_without_classes(arm: Path, tmp_path: Path) -> None:
+    path = arm / "arm.xacro"
+    with pytest.raises(ModelError, match=r"needs a value of its argument 'name': write xacro_args"):
+        hovi.load_robot(path)
+    with pytest.raises(ModelError) as error:
+        hovi.load_robot(path, xacro_args={"name": "ur"})
+    assert "needs the package 'parts_description'" in str(error.value)
+    assert "--package-dir FOLDER" in str(error.value)
+    assert str(error.value).count("parts_description") == 1
+    assert not any(word in str(error.value) for word in ("class", "Exception", "Error"))
+    elsewhere = package(tmp_path / "else" / "p", "parts_description", {"link.xacro": PART})
+    for folder in (elsewhere, elsewhere.parent):
+        given = {"name": "ur"}
+        assert hovi.load_robot(path, package_dirs=[folder], xacro_args=given).nv == 1
+        with pytest.raises(ModelError, match="no argument 'nmae': did you mean 'name'"):
+            hovi.load_robot(path, package_dirs=[folder], xacro_args=given | {"nmae": "ur"})
+    (elsewhere / "link.xacro").write_text(PART.replace("${mass}", "${mess}"))
+    with pytest.raises(ModelError) as error:
+        hovi.load_robot(path, package_dirs=[elsewhere], xacro_args={"name": "ur"})
+    assert str(error.value).count("mess") == 2  # what is not defined, and where
+    assert "in 'link.xacro'" in str(error.value) or "arm.xacro" in str(error.value)
+
+
+def test_arguments_are_for_xacro_files_only() -> None:
+    with pytest.raises(InputError, match="xacro_args are those of a xacro file, and 'panda'"):
+        hovi.load_robot("panda", xacro_args={"name": "ur"})
+    with pytest.raises(InputError, match="texts, numbers, True or False, got 'name': \\[\\]"):
+        hovi.load_robot("panda", xacro_args={"name": []})
+
+
+def test_the_command_line_takes_arguments_and_packages(
+    arm: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    package(tmp_path / "else" / "p", "parts_description", {"link.xacro": PART})
+    file, folder = str(arm / "arm.xacro"), str(tmp_path / "else")
+    given = ["--xacro-arg", "name:=ur", "--xacro-arg", "mass:=7", "--package-dir", folder]
+    assert main(["info", file, *given]) == 0
+    assert capsys.readouterr().out.startswith("ur: 1 joint, nq = 1, nv = 1, 7 kg")
+    assert main(["info", file, "--xacro-arg", "name=ur"]) == 2
+    assert "takes NAME:=VALUE" in capsys.readouterr().err
+    assert main(["info", file]) == 2
+    assert capsys.readouterr().err.count("'name'") == 1

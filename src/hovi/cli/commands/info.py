@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Annotated
 
 import typer
+
+from hovi.cli.arguments.robots import PackageDirs, XacroArgs, robot_of
 
 
 def info(
@@ -13,8 +16,8 @@ def info(
         str | None,
         typer.Argument(
             metavar="ROBOT|SCENE.toml|FILE.npz",
-            help="A .urdf, a name of example-robot-data, a scene file, a shipped scene's name or a "
-            "motion; without it, all names are listed.",
+            help="A .urdf or .xacro, a name of example-robot-data, a scene file, a shipped "
+            "scene's name or a motion; without it, all names are listed.",
         ),
     ] = None,
     mimic: Annotated[
@@ -23,6 +26,8 @@ def info(
     free_flyer: Annotated[
         bool, typer.Option("--free-flyer", help="Give the robot a floating base.")
     ] = False,
+    package_dir: PackageDirs = None,
+    xacro_arg: XacroArgs = None,
 ) -> None:
     """Describe a robot, a scene and the effects that it leaves out, or a motion."""
     from hovi.errors import InputError, nearest
@@ -40,7 +45,7 @@ def info(
     elif what.lower().endswith(".npz"):
         print(_motion(what))
     elif is_path(what) or what in robots or format_of(what) == "description":
-        print(_robot(what, mimic, free_flyer))
+        print(robot_of(what, mimic, free_flyer, package_dir or (), xacro_arg or ()).describe())
     else:
         raise InputError(
             f"there is no robot or scene {what!r}; {nearest(what, (*robots, *scenes))} "
@@ -64,17 +69,9 @@ def _scene(scene: str) -> str:
 
 
 def _motion(file: str) -> str:
-    from pathlib import Path
-
     from hovi.cli.arguments.files import load_trajectory
     from hovi.discrete.output.caution import caution_lines
 
     motion = load_trajectory(Path(file))
     lines = caution_lines([motion.metadata])
     return "\n".join([repr(motion), *(f"caution: {each}" for each in lines)])
-
-
-def _robot(robot: str, mimic: bool, free_flyer: bool) -> str:
-    from hovi.robot.loading import load_robot
-
-    return load_robot(robot, mimic=mimic, free_flyer=free_flyer or None).describe()
