@@ -65,7 +65,7 @@ def test_every_part_of_a_plan_shows_that_it_runs(
 def test_a_study_of_effects_shows_each_of_them(
     monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(reports, "LINE_PERIOD", 1e-3)
+    monkeypatch.setattr(reports, "LINE_PERIOD", 1e-4)
     # as time allows; reading its meshes takes longer than a line
     assert main(["effects", "ur5_reach", "--time-limit", "3 s"]) in (0, 1)
     shown = capfd.readouterr().err

@@ -11,15 +11,18 @@ from __future__ import annotations
 import os
 import xml.etree.ElementTree as ElementTree
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
+import coal
+import numpy as np
+import numpy.typing as npt
 import pinocchio as pin
 
 from hovi.errors import ModelError
 from hovi.robot.example_robots import example_robot
 from hovi.robot.formats.packages import holds_all_files, package_name
-from hovi.robot.meshes.mesh_shape import MeshShape, mesh_shape
+from hovi.robot.meshes.mesh_shape import mesh_shape
 from hovi.robot.model import build_full_model, couplings_in, locked_and_coupled
 from hovi.robot.source import RobotSource
 from hovi.robot.urdf.check import checked_urdf
@@ -30,6 +33,22 @@ from hovi.system.files import reason
 
 MAX_ALL_MESHES = 256_000_000
 """Largest sum of the bytes of all meshes, each counted as often as it is used."""
+
+ShapeOf = Callable[[Path, bytes, Sequence[float]], coal.CollisionGeometry]
+"""The shape of a mesh from its path, content and scale; it raises ModelError."""
+
+
+@dataclass(frozen=True, eq=False)
+class MeshShape:
+    """A mesh of a robot as a shape, and where it is from.
+
+    path: of the file. scale: factors of the coordinates, (3,). size: of the file, in bytes.
+    """
+
+    shape: coal.CollisionGeometry
+    path: str
+    scale: npt.NDArray[np.float64]
+    size: int
 
 
 Meshes = dict[tuple[str, int], MeshShape]
@@ -44,11 +63,15 @@ class Shapes:
     problem: str
 
 
-def load_shapes(source: RobotSource, kind: str) -> Shapes:
-    """The "visual" or "collision" geometry of a source, with its joints locked and coupled."""
+def load_shapes(source: RobotSource, kind: str, shape_of: ShapeOf = mesh_shape) -> Shapes:
+    """The "visual" or "collision" geometry of a source, with its joints locked and coupled.
+
+    shape_of: makes the shape of a mesh, of its triangles by default. Shapes that have the same mesh
+        and scale share it.
+    """
     if source.urdf is None:
         return Shapes(None, f"robot {source.reference!r} was given without {kind} geometry.")
-    text, meshes, problems = _without_meshes(source, kind)
+    text, meshes, problems = _without_meshes(source, kind, shape_of)
     geometry_type = pin.GeometryType.VISUAL if kind == "visual" else pin.GeometryType.COLLISION
     model = build_full_model(source)
     try:
@@ -138,18 +161,26 @@ def _package_dirs(source: RobotSource) -> list[Path]:
     return folders
 
 
-def _without_meshes(source: RobotSource, kind: str) -> tuple[str, Meshes, list[str]]:
+def _without_meshes(
+    source: RobotSource, kind: str, shape_of: ShapeOf
+) -> tuple[str, Meshes, list[str]]:
     """The URDF with a box in place of every mesh, the meshes, and why other shapes are left out."""
     robot = checked_urdf(source.urdf or "", source.reference)
     _drop_textures(robot)
     problems, meshes, room = list[str](), Meshes(), MAX_ALL_MESHES
+    known = dict[tuple[str, str], MeshShape]()
     for link in robot.iterfind("link"):
         name, kept = link.get("name", ""), 0
         for shape in link.findall(kind):
             try:
                 if (mesh := shape.find("geometry/mesh")) is not None:
-                    meshes[name, kept] = _read(mesh, source, kind == "visual", room)
-                    room -= meshes[name, kept].size
+                    key = mesh.get("filename", ""), mesh.get("scale", "1 1 1")
+                    if key in known:
+                        _require_room(Path(key[0]), known[key].size, room)
+                    else:
+                        known[key] = _read(*key, source, kind == "visual", shape_of, room)
+                    meshes[name, kept] = known[key]
+                    room -= known[key].size
             except ModelError as error:
                 problems.append(f"link {name!r}: {error}")
                 link.remove(shape)
@@ -187,14 +218,21 @@ def _drop_textures(robot: ElementTree.Element) -> None:
             robot.remove(material)
 
 
-def _read(mesh: ElementTree.Element, source: RobotSource, drawn: bool, room: int) -> MeshShape:
-    """The shape of a <mesh>. room: the largest number of bytes. Raises ModelError."""
-    path, content = find_mesh(mesh.get("filename", ""), source, drawn)
-    if len(content) > room:
+def _read(
+    filename: str, scale: str, source: RobotSource, drawn: bool, shape_of: ShapeOf, room: int
+) -> MeshShape:
+    """The shape of a <mesh> with these attributes. room: see _require_room. Raises ModelError."""
+    path, content = find_mesh(filename, source, drawn)
+    _require_room(path, len(content), room)
+    factors = [float(word) for word in scale.split()]
+    return MeshShape(shape_of(path, content, factors), str(path), np.array(factors), len(content))
+
+
+def _require_room(path: Path, size: int, room: int) -> None:
+    """Raise ModelError for a mesh with more bytes than there is room for."""
+    if size > room:
         largest = f"{MAX_ALL_MESHES / 1e6:.0f} MB"
         raise ModelError(f"mesh {path.name!r} makes the meshes of all shapes exceed {largest}.")
-    scale = [float(word) for word in mesh.get("scale", "1 1 1").split()]
-    return mesh_shape(path, content, scale)
 
 
 def _sentence(source: RobotSource, kind: str, problems: list[str]) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
@@ -28,6 +29,12 @@ def build_full_model(source: RobotSource) -> pin.Model:
     Leaders of mimic joints come first, since Pinocchio couples them in no other order. Raises
     ModelError.
     """
+    return _full_model(source).copy()
+
+
+@lru_cache(maxsize=8)
+def _full_model(source: RobotSource) -> pin.Model:
+    """That model, which the shapes of a robot need again; not to be changed."""
     if source.urdf is None:
         raise ModelError(
             f"robot {source.reference!r} was given as a pinocchio.Model, which files do not store: "

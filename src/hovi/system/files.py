@@ -18,7 +18,7 @@ _DESCRIPTORS = Path("/proc/self/fd")
 
 
 @contextlib.contextmanager
-def whole_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
+def whole_file(path: str | os.PathLike[str], durable: bool = True) -> Iterator[BinaryIO]:
     """A binary file that replaces `path` only if the block ends without an exception.
 
     The bytes go to an unnamed file in the same folder until all of them are on the disk, so a
@@ -29,6 +29,8 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
 
     path: the file to write; an existing regular file is replaced and keeps its permissions. Of a
         symbolic link, the file to which it leads is written, and the link stays.
+    durable: whether it is waited for until file and name are on the disk, some ms; without, a crash
+        of the system may leave an empty or damaged file.
     Raises OSError as the operating system does, and when `path` is a folder or a device, or no
     path at all.
     """
@@ -40,11 +42,13 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
                 os.fchmod(stream.fileno(), stat.S_IMODE(target.stat().st_mode))
             yield stream
             stream.flush()
-            os.fsync(stream.fileno())
+            if durable:
+                os.fsync(stream.fileno())
             if not temporary.exists():
                 _link(stream, temporary)
         temporary.replace(target)  # a hard link cannot replace an existing file
-        sync_folder(target.parent)
+        if durable:
+            sync_folder(target.parent)
     finally:
         temporary.unlink(missing_ok=True)
 

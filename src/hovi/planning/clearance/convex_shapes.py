@@ -9,7 +9,9 @@ import numpy as np
 import pinocchio as pin
 
 from hovi.errors import ModelError
+from hovi.planning.clearance.mesh_hulls import mesh_hull
 from hovi.planning.obstacles.hull import hull_of
+from hovi.robot.geometry import load_shapes
 from hovi.robot.robot import Robot
 
 _CONVEX = (
@@ -31,11 +33,12 @@ def convex_geometry(robot: Robot) -> pin.GeometryModel:
     Raises ModelError for a robot without collision shapes or with missing ones, whose distances
     would be too large.
     """
-    if robot.collision_problem:
-        raise ModelError(
-            f"distances to obstacles need every collision shape: {robot.collision_problem}"
-        )
-    given = robot.collision
+    given, problem = robot.given[1], ""
+    if given is None:  # hulls need no triangles, which take ten times as long to put into a tree
+        shapes = load_shapes(robot.source, "collision", mesh_hull)
+        given, problem = shapes.geometry, shapes.problem
+    if problem:
+        raise ModelError(f"distances to obstacles need every collision shape: {problem}")
     if given is None or given.ngeoms == 0:
         raise ModelError(
             f"robot {robot.name!r} has no collision shapes to compute distances from: add "

@@ -6,11 +6,9 @@
 from __future__ import annotations
 
 import io
-import os
 import subprocess
 import sys
 import tempfile
-from contextlib import suppress
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -22,10 +20,8 @@ import numpy.typing as npt
 from hovi.errors import InputError
 from hovi.planning.obstacles.hull import hull_of
 from hovi.planning.obstacles.triangle_mesh import TriangleMesh
-from hovi.system.cache_home import cache_home
 from hovi.system.deadline import raise_if_late, time_left
-from hovi.system.files import whole_file
-from hovi.system.private_folder import UnsafeFolderError, is_private_file, private_folder
+from hovi.system.kept_files import keep, kept
 
 Array = npt.NDArray[np.float64]
 Parts = tuple[Array, ...]
@@ -37,7 +33,6 @@ MAX_PARTS = 200
 _KEY = f"coacd-1-{THRESHOLD:g}"
 """Part of the name of a cached file, to be changed with what is computed."""
 _MAX_SECONDS = 600.0
-_MAX_BYTES = 64_000_000
 _WORKER = Path(__file__).with_name("coacd_worker.py")
 
 
@@ -46,14 +41,12 @@ def convex_parts(mesh: TriangleMesh) -> Parts:
 
     Raises InputError without CoACD, and for a mesh that it cannot divide.
     """
-    file = _cached_file(mesh.digest)
-    parts = None if file is None else _read(file)
+    name = f"{_KEY}-{mesh.digest}.npz"
+    content = kept("convex_parts", name)
+    parts = None if content is None else _unpacked(content)
     if parts is None:
         parts = _divided(mesh)
-        if file is not None:
-            with suppress(OSError), whole_file(file) as stream:
-                os.fchmod(stream.fileno(), 0o600)
-                stream.write(_packed(parts))
+        keep("convex_parts", name, _packed(parts))
     return parts
 
 
@@ -109,26 +102,6 @@ def _divided(mesh: TriangleMesh) -> Parts:
             "out convex_parts to take its convex hull."
         )
     return parts
-
-
-def _cached_file(digest: str) -> Path | None:
-    """Where the parts of a mesh are kept; None without a folder that nobody else can change."""
-    try:
-        folder = private_folder(cache_home(), ("hovi", "convex_parts"))
-    except (UnsafeFolderError, OSError, RuntimeError):
-        return None
-    return folder / f"{_KEY}-{digest}.npz"
-
-
-def _read(file: Path) -> Parts | None:
-    """The parts in a file; None if there are none."""
-    try:
-        with file.open("rb") as stream:
-            if not is_private_file(stream.fileno()):
-                return None
-            return _unpacked(stream.read(_MAX_BYTES))
-    except OSError:
-        return None
 
 
 def _packed(parts: Parts) -> bytes:

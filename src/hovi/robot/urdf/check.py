@@ -9,7 +9,9 @@ text, only what normalize.py writes.
 
 from __future__ import annotations
 
+import copy
 import xml.etree.ElementTree as ElementTree
+from functools import lru_cache
 from pathlib import Path
 from typing import NoReturn
 from xml.parsers import expat
@@ -58,6 +60,12 @@ def check_urdf(text: str, name: str = "robot.urdf") -> None:
 
 def checked_urdf(text: str, name: str = "robot.urdf") -> ElementTree.Element:
     """The element <robot> of the text of a URDF, checked. Raises ModelError."""
+    return copy.deepcopy(_checked(text, name))
+
+
+@lru_cache(maxsize=2)
+def _checked(text: str, name: str) -> ElementTree.Element:
+    """That element, which is looked at several times while a robot is loaded."""
     return noted_urdf(text, name)[0]
 
 
