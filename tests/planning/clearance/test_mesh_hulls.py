@@ -66,9 +66,10 @@ def test_the_second_hull_is_read_and_equal(cache: Path, counted: list[int]) -> N
 def test_another_mesh_scale_or_type_has_another_hull(cache: Path, counted: list[int]) -> None:
     first = np.array(hull().points())
     doubled = np.array(hull(scale=[2.0, 1.0, 4.0]).points())
-    moved = np.array(hull(mesh(POINTS + 1.0)).points())
+    last = np.vstack([POINTS[:-1], [[9.0, 9.0, 9.0]]])
+    drawn_out = np.array(hull(mesh(last)).points())
     np.testing.assert_allclose(doubled, 2.0 * first, rtol=1e-12)
-    np.testing.assert_allclose(moved, first + SCALE, rtol=1e-12)
+    np.testing.assert_allclose(drawn_out.max(axis=0), 9.0 * np.array(SCALE), rtol=1e-12)
     with pytest.raises(ModelError):
         mesh_hull(Path("a.stl"), mesh(), SCALE)
     assert len(counted) == 3
