@@ -5,13 +5,17 @@ from __future__ import annotations
 import importlib
 import os
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from hovi.checks.arguments import check_arguments_except
 from hovi.discrete.output.caution import warn_of_cautions
 from hovi.discrete.trajectory import Trajectory
-from hovi.errors import InputError, expect, nearest
+from hovi.errors import InputError, nearest
 from hovi.system.dataclass import dataclass
+from hovi.viewing.curves.given_motion import motion_in
+
+if TYPE_CHECKING:
+    from hovi.planning.solver.solver import Solution
 
 
 @dataclass(frozen=True)
@@ -90,7 +94,7 @@ def format_of_file(path: Path) -> ExportFormat:
 
 @check_arguments_except("trajectory")
 def export(
-    trajectory: Trajectory,
+    trajectory: Trajectory | Solution,
     path: str | os.PathLike[str],
     format: str | None = None,
     rate: float | None = None,
@@ -107,7 +111,7 @@ def export(
     format cannot hold, DisplayError when the file cannot be written or an optional library is
     missing.
     """
-    expect(trajectory, Trajectory, "the trajectory of a solution")
+    trajectory = motion_in(trajectory)
     if format is None:
         chosen = format_of_file(Path(path))
     else:

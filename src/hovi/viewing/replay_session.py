@@ -11,7 +11,7 @@ import warnings
 import webbrowser
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Self
+from typing import TYPE_CHECKING, Any, Self
 
 from hovi.checks.arguments import check_arguments_except
 from hovi.discrete.output.caution import caution_lines, warn_of_cautions
@@ -23,12 +23,16 @@ from hovi.system.dataclass import dataclass
 from hovi.system.files import reason, whole_file
 from hovi.system.terminal import has_browser, terminal_script, wait_at_exit, wait_for_interrupt
 from hovi.viewing.animation import animation_of, frame_times
+from hovi.viewing.curves.given_motion import motion_in
 from hovi.viewing.drawing import drawn, ghost_color
 from hovi.viewing.highlights import AT_LIMIT_NOTE, Highlights
 from hovi.viewing.meshcat_page import Page, packed
 from hovi.viewing.meshcat_server import ServedPage
 from hovi.viewing.panel.panel import Curves, Panel, View, joints_of, labels_of, names_of
 from hovi.viewing.recorded_limits import MovingObjects, imposed_limits, led_back_sentence
+
+if TYPE_CHECKING:
+    from hovi.planning.solver.solver import Solution
 
 with warnings.catch_warnings():
     # meshcat imports a deprecated module of ZeroMQ that hovi does not use.
@@ -134,9 +138,9 @@ class Replay:
 
 @check_arguments_except("trajectory", "compare")
 def replay(
-    trajectory: Trajectory,
+    trajectory: Trajectory | Solution,
     *,
-    compare: Sequence[Trajectory] = (),
+    compare: Sequence[Trajectory | Solution] = (),
     speed: float = 1.0,
     loop: bool = False,
     trace: bool = True,
@@ -154,7 +158,8 @@ def replay(
     it waits for Ctrl-C. In a notebook, in the interpreter, and where there is no terminal, as in a
     test, nothing waits.
 
-    trajectory: the motion. A robot without visual models is drawn as a skeleton.
+    trajectory: the motion, or a solution for its own. A robot without visual models is drawn as a
+        skeleton.
     compare: other motions, shown as ghosts at the same times.
     speed: motion seconds per second. loop: play again and again.
     trace: draw the paths of the robot's tip_frames.
@@ -169,7 +174,7 @@ def replay(
     Raises DisplayError when the page cannot be served, opened or written.
     """
     check_speed(speed)
-    others = _motions(compare)
+    trajectory, others = motion_in(trajectory), _motions(compare)
     if html is not None:
         return write_html(trajectory, html, compare=others, speed=speed, loop=loop, trace=trace)
     script = terminal_script()
@@ -300,11 +305,11 @@ def _panel(
     )
 
 
-def _motions(compare: Sequence[Trajectory]) -> tuple[Trajectory, ...]:
-    if isinstance(compare, Trajectory):
-        return (compare,)
+def _motions(compare: Any) -> tuple[Trajectory, ...]:
+    if isinstance(compare, Trajectory) or hasattr(compare, "trajectory"):
+        return (motion_in(compare),)
     try:
-        motions = tuple(compare)
+        motions = tuple(getattr(each, "trajectory", each) for each in compare)
     except TypeError as error:
         raise InputError(
             f"compare must be a list of trajectories, got {type(compare).__name__}."

@@ -43,7 +43,9 @@ _OTHER_POSES = {
 }
 """What to write for numbers of another shape than that of a pose."""
 ORTHONORMALITY_TOLERANCE = 1e-6
-"""Largest deviation of a rotation matrix from orthonormality, and smallest length of an axis."""
+"""Smallest length of an axis."""
+ROUNDING = 2e-3
+"""Largest deviation of a rotation matrix from orthonormality, as that of three digits."""
 
 
 def _check_names(owner: type[Owner]) -> type[Owner]:
@@ -302,14 +304,18 @@ def _direction(value: npt.ArrayLike) -> Array:
 
 def _rotation(value: npt.ArrayLike) -> Array:
     matrix = _numbers("rotation", value)
-    fits = matrix.shape == (3, 3) and (np.abs(matrix) <= 1 + ORTHONORMALITY_TOLERANCE).all()
-    if not fits or np.max(np.abs(matrix.T @ matrix - np.eye(3))) > ORTHONORMALITY_TOLERANCE:
+    fits = matrix.shape == (3, 3) and (np.abs(matrix) <= 1 + ROUNDING).all()
+    off = float(np.max(np.abs(matrix.T @ matrix - np.eye(3)))) if fits else np.inf
+    if off > ROUNDING:
+        found = f", and is off by {off:.2g}" if fits else ""
         raise InputError(
-            f"the rotation of a frame goal must be an orthonormal (3, 3) matrix, got {value!r}."
+            "the rotation of a frame goal must be an orthonormal (3, 3) matrix, to three digits"
+            f"{found}; got {value!r}."
         )
     if np.linalg.det(matrix) < 0:
         raise InputError("the rotation of a frame goal is a reflection; reverse one of its axes.")
-    return matrix
+    left, _, right = np.linalg.svd(matrix)
+    return matrix if off <= 1e-12 else np.asarray(left @ right)
 
 
 def _norm(x: npt.ArrayLike) -> float:

@@ -96,12 +96,25 @@ def _refusal(name: str, must_be: str, number: Any) -> InputError:
     return InputError(f"`{name}` must be {must_be}, but it is {shown(number)}.")
 
 
+ELSEWHERE = {
+    "constraints": "conditions of your own along a motion are not supported, a stiff running cost "
+    "comes near them: see docs/costs.md and docs/when_not.md",
+    "contacts": "contacts are not planned for: see docs/when_not.md",
+    "velocity_scaling": 'give limits, such as limits={"v": ...} in rad/s',
+    "acceleration_scaling": 'give limits, such as limits={"a": ...} in rad/s^2',
+}
+"""What to do instead of options that other planners have."""
+
+
 def require_known(options: type, names: Iterable[str]) -> None:
     """Raise InputError for unknown option names."""
     known = option_infos(options)
     for name in names:
         if name not in known:
-            raise InputError(f"there is no option {name!r}: {nearest(name, known)}")
+            advice = ELSEWHERE.get(name)
+            raise InputError(
+                f"there is no option {name!r}: {f'{advice}.' if advice else nearest(name, known)}"
+            )
 
 
 def described(options: type) -> str:

@@ -9,10 +9,11 @@ import numpy.typing as npt
 from matplotlib.axes import Axes
 
 from hovi.discrete.trajectory import Trajectory
-from hovi.errors import DisplayError, InputError, expect
+from hovi.errors import DisplayError, InputError
 from hovi.planning.problem.limits import KINDS, Limits
 from hovi.planning.solver.solver import Solution
 from hovi.viewing.curves.colors import COLORS
+from hovi.viewing.curves.given_motion import motion_in
 from hovi.viewing.curves.shown_figure import ShownFigure
 from hovi.viewing.curves.unwrapped_angles import unwrapped
 
@@ -35,10 +36,7 @@ def compared(
         others = (others,)
     if not isinstance(others, Sequence):
         raise InputError(f"compare must be a list of motions, got {type(others).__name__}.")
-    given = [each.trajectory if isinstance(each, Solution) else each for each in (motion, *others)]
-    for each in given:
-        expect(each, Trajectory, "the trajectory of a solution")
-    return given
+    return [motion_in(each) for each in (motion, *others)]
 
 
 def joint_figure(

@@ -11,6 +11,7 @@ import os
 from collections.abc import Iterator
 from pathlib import Path
 from string import Template
+from typing import TYPE_CHECKING
 
 import matplotlib
 import numpy as np
@@ -21,7 +22,7 @@ from hovi.discrete.measures.motion_effort import effort_of
 from hovi.discrete.measures.motion_extremes import extremes
 from hovi.discrete.output.caution import caution_lines
 from hovi.discrete.trajectory import Trajectory
-from hovi.errors import DisplayError, HoviError, expect
+from hovi.errors import DisplayError, HoviError
 from hovi.flows.execution.dynamics_replay import DynamicsReplay, replay_dynamics
 from hovi.planning.clearance.clearance_violation import closest_along
 from hovi.planning.problem.limit_violation import closeness
@@ -30,9 +31,13 @@ from hovi.scene.scene import Scene
 from hovi.system.deadline import Deadline, OutOfTimeError
 from hovi.system.files import reason, whole_file
 from hovi.version import __version__
+from hovi.viewing.curves.given_motion import motion_in
 from hovi.viewing.plotting import motion_figure
 from hovi.viewing.recorded_limits import imposed_limits, kept_distances, led_back_sentence
 from hovi.viewing.replay_session import page_of
+
+if TYPE_CHECKING:
+    from hovi.planning.solver.solver import Solution
 
 Array = npt.NDArray[np.float64]
 Row = tuple[str, ...]
@@ -45,7 +50,7 @@ _MAX_SCENE = 60_000  # [characters]
 
 
 @check_arguments_except("trajectory")
-def write_report(trajectory: Trajectory, path: str | os.PathLike[str]) -> None:
+def write_report(trajectory: Trajectory | Solution, path: str | os.PathLike[str]) -> None:
     """Write one HTML file about a motion that needs no network, for somebody without hovi.
 
     It replays the motion, and shows its curves, what was recorded of its solution, what is checked
@@ -54,7 +59,7 @@ def write_report(trajectory: Trajectory, path: str | os.PathLike[str]) -> None:
 
     path: the file; it is written completely or not at all. Raises DisplayError.
     """
-    expect(trajectory, Trajectory, "the trajectory of a solution")
+    trajectory = motion_in(trajectory)
     text = report_html(trajectory)
     try:
         with whole_file(path) as stream:
