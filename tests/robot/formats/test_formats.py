@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -14,6 +15,7 @@ import pytest
 import hovi
 from hovi.cli.application import main
 from hovi.errors import HoviError, InputError, ModelError
+from hovi.robot.formats.packages import package_name
 from hovi.robot.formats.recognized import format_of
 from samples.cubic_motion import cubic_motion
 
@@ -304,3 +306,15 @@ def test_the_command_line_takes_arguments_and_packages(
     assert "takes NAME:=VALUE" in capsys.readouterr().err
     assert main(["info", file]) == 2
     assert capsys.readouterr().err.count("'name'") == 1
+
+
+@pytest.mark.parametrize("kind", ["a pipe", "a large file", "a folder", "no text"])
+def test_an_odd_package_file_names_no_package(tmp_path: Path, kind: str) -> None:
+    file = tmp_path / "package.xml"
+    if kind == "a pipe":
+        os.mkfifo(file)
+    elif kind == "a folder":
+        file.mkdir()
+    else:
+        file.write_bytes(b"\xff" * 100 if kind == "no text" else b"<name>a</name>" + b" " * 10**6)
+    assert package_name(tmp_path) is None

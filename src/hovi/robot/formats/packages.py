@@ -8,16 +8,22 @@ from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from pathlib import Path
 
+from hovi.system.files import require_file
+
 LEVELS = 3
 """Folders above the package of a file in which other packages of the same source tree are."""
 
+MAX_BYTES = 1_000_000
+"""Largest package.xml that is read."""
 _NAME = re.compile(r"<name>\s*([^\s<]+)\s*</name>")
 
 
 def package_name(folder: Path) -> str | None:
     """The name of the package in a folder; None without a package.xml that has one."""
+    file = folder / "package.xml"
     try:
-        found = _NAME.search((folder / "package.xml").read_text(errors="replace"))
+        require_file(file, MAX_BYTES)
+        found = _NAME.search(file.read_text(errors="replace"))
     except OSError:
         return None
     return found and found[1]
