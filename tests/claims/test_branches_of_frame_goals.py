@@ -10,6 +10,11 @@ import hovi
 KEEP = {"limits": "urdf", "self_collision": False}
 DURATION = 2.5
 MOST = 1.02
+FOLDED = pytest.mark.xfail(
+    strict=True,
+    reason="next to a fold that is next to a limit a solve with a free end misses its pose by 0.2 "
+    "mm, from any guess, and the next branch costs 46 % more",
+)
 
 
 @pytest.fixture(scope="module")
@@ -36,7 +41,7 @@ def test_a_pose_whose_cubics_all_mislead_is_reached_in_the_cheapest_branch(
     assert "branches of the ends were compared" in found.message
 
 
-@pytest.mark.parametrize("seed", [7, 13, 20, 21])
+@pytest.mark.parametrize("seed", [7, 13, 20, 21, pytest.param(11, marks=FOLDED)])
 def test_random_poses_are_reached_in_the_cheapest_branch(scene: hovi.Scene, seed: int) -> None:
     """Seeds of which a choice by cubics was dearer by 6 to 36 %."""
     random = np.random.default_rng(1000 + seed)
