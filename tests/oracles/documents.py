@@ -20,7 +20,8 @@ def typed(line):
     import signal, subprocess, sys
 
     child = subprocess.Popen(["bash", "-c", f"exec {line}" if line.startswith("hovi ") else line],
-                             stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, text=True)
+                             stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, text=True,
+                             preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL))
     for said in child.stdout:
         print(said, end="")
         if "Ctrl-C ends" in said:
