@@ -21,9 +21,9 @@ def demo(
     from hovi.viewing.documents.demo import DemoServer
 
     server = DemoServer(port)
-    print(f"eight motions at {server.url}; Ctrl-C ends it", flush=True)
-    if browser and has_browser():
-        webbrowser.open(server.url, new=2)
     with contextlib.suppress(KeyboardInterrupt):
+        print(f"eight motions at {server.url}; Ctrl-C ends it", flush=True)
+        if browser and has_browser():
+            webbrowser.open(server.url, new=2)
         server.plan_what_is_chosen(lambda line: print(line, flush=True))
     server.close()
