@@ -42,7 +42,7 @@ _OTHER_POSES = {
     (7,): "for a quaternion write position=..., quaternion_xyzw=... or quaternion_wxyz=...",
 }
 """What to write for numbers of another shape than that of a pose."""
-ORTHONORMALITY_TOLERANCE = 1e-6
+LEAST_LENGTH = 1e-6
 """Smallest length of an axis."""
 ROUNDING = 2e-3
 """Largest deviation of a rotation matrix from orthonormality, as that of three digits."""
@@ -297,7 +297,7 @@ def _axis(given: Any) -> tuple[npt.ArrayLike, ...]:
 
 def _direction(value: npt.ArrayLike) -> Array:
     vector = _vector("axis", value)
-    if math.hypot(*vector) < ORTHONORMALITY_TOLERANCE:
+    if math.hypot(*vector) < LEAST_LENGTH:
         raise InputError("the axis of a frame goal has length zero; give a direction.")
     return unit_vector(vector)
 

@@ -78,12 +78,12 @@ class _Search:
             tried = self._solved(weight, best.trajectory)
             if tried.status in (Status.TIME_LIMIT, Status.INTERRUPTED):
                 return self._stopped(best, tried.status)
+            halved = 0 < weight <= LEAST_JUMP * self.weight * (1 + 1e-9)
             if tried.success:
-                halved = self.weight > 0 and weight <= LEAST_JUMP * self.weight * (1 + 1e-9)
                 change = abs(tried.trajectory.duration / best.trajectory.duration - 1)
                 self.changes = [*self.changes, change] if halved else []
                 best, self.weight = tried, weight
-            elif self.weight > 0 and weight <= LEAST_JUMP * self.weight * (1 + 1e-9):
+            elif halved:
                 return self._ended(best, f"a smaller one was not resolved ({tried.status})")
             else:
                 factor = max(LEAST_JUMP, np.sqrt(factor))
