@@ -136,8 +136,14 @@ def nearest(name: str, valid: Iterable[str]) -> str:
     close = difflib.get_close_matches(name[:_MAX_COMPARED], names, n=3, cutoff=0.5)
     if close:
         return "did you mean " + " or ".join(repr(c) for c in close) + "?"
-    more = f" and {len(names) - _MAX_LISTED} more" if len(names) > _MAX_LISTED else ""
-    return "valid names are " + ", ".join(repr(n) for n in names[:_MAX_LISTED]) + more + "."
+    return f"valid names are {some_of(map(repr, names), _MAX_LISTED)}."
+
+
+def some_of(names: Iterable[str], most: int = 4) -> str:
+    """The first names, and how many more there are: "a, b, c, d and 3 more"."""
+    found = list(names)
+    more = f" and {len(found) - most} more" if len(found) > most else ""
+    return ", ".join(found[:most]) + more
 
 
 def _sanitized(sentence: str) -> str:

@@ -30,7 +30,7 @@ FLOORS = [
 ]
 # The folders inside a package, in the same order; "" stands for the files of the package itself.
 INSIDE = {
-    "robot": [{"meshes"}, {"formats", "space", "urdf"}, {""}],
+    "robot": [{"meshes"}, {"space", "urdf"}, {"findings"}, {"formats"}, {""}],
     "effects": [{"expressions"}, {""}],
     "discrete": [{"output"}, {""}, {"measures"}],
     "flows": [{""}, {"execution"}],

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
-from hovi.robot.reordered_model import continuous_joint
+from hovi.robot.space.reordered_model import continuous_joint
 
 _ALONG, _ACROSS = np.array([0.48, -0.6, 0.64]), np.array([0.8, 0.0, -0.6])
 _NAMED = {

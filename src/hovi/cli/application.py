@@ -35,6 +35,7 @@ COMMANDS = (
     "check",
     "schema",
     "info",
+    "doctor",
     "demo",
 )
 """The commands, in the order of the help; each is a module of that name in `hovi.cli.commands`."""

@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from hovi.checks.arguments import check_arguments
 from hovi.checks.shapes import require_shape
-from hovi.errors import InputError
+from hovi.errors import InputError, some_of
 from hovi.flows.segment import IntervalLagrangian
 from hovi.optimize.batched_newton import newton
 from hovi.scene.casadi_lagrangian import CasadiLagrangian
@@ -163,8 +163,7 @@ def coordinates_in_words(lagrangian: Lagrangian, coordinates: Indices) -> str:
         shown = [repr(scene.robot.coordinate_names[i]) for i in coordinates]
     else:
         shown = [f"q[{i}]" for i in coordinates]
-    more = f" and {len(shown) - 6} more" if len(shown) > 6 else ""
-    return ", ".join(shown[:6]) + more
+    return some_of(shown, 6)
 
 
 @check_arguments

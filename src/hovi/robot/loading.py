@@ -13,6 +13,7 @@ from hovi.checks.arguments import check_arguments_except
 from hovi.checks.kinds import is_number
 from hovi.errors import InputError, ModelError, expect, warn
 from hovi.robot.example_robots import BUILT_IN_CODE, build_in_code, example_robot, rotor_armature
+from hovi.robot.findings.loops import open_loops
 from hovi.robot.formats.descriptions import description_of
 from hovi.robot.formats.mjcf import model_of_mjcf
 from hovi.robot.formats.recognized import format_of
@@ -84,11 +85,7 @@ def file_source(
 def _warn_of_loops(urdf: str, name: str) -> None:
     """Warn of loops that are not kept; `hovi info` has them for examples, too."""
     if ties := closed_loops(checked_urdf(urdf, name)):
-        warn(
-            f"URDF {name!r}: its links move freely, without {', '.join(ties[:3])}"
-            f"{f' and {len(ties) - 3} more' if len(ties) > 3 else ''}: lock the joints of the "
-            "loop, or plan for a robot without it."
-        )
+        warn(open_loops(f"URDF {name!r}", "links", [tie.text for tie in ties]))
 
 
 def example_source(

@@ -8,7 +8,8 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from hovi.errors import ModelError
+from hovi.errors import ModelError, some_of
+from hovi.robot.findings.subject import LightJoint
 from hovi.robot.mimic_model import CoordinateMap, uncoupled
 from hovi.robot.space.joint_kinds import ANGLE, kind_of
 
@@ -78,8 +79,7 @@ def joints_without_inertia(model: pin.Model) -> list[int]:
 
 def named_joints(model: pin.Model, joints: list[int]) -> str:
     """The names of joints, up to three of them, with the links that they move."""
-    more = f" and {len(joints) - 3} more" if len(joints) > 3 else ""
-    return ", ".join(f"{model.names[j]!r}{_link_of(model, j)}" for j in joints[:3]) + more
+    return some_of([f"{model.names[j]!r}{_link_of(model, j)}" for j in joints], 3)
 
 
 def _singular_mass_sentence(model: pin.Model, joints: list[int]) -> str:
@@ -105,11 +105,11 @@ def _link_of(model: pin.Model, joint: int) -> str:
     return next((f" (link {frame.name!r})" for frame in frames), "")
 
 
-def light_joints(model: pin.Model) -> dict[str, float]:
+def little_inertia(model: pin.Model) -> dict[str, LightJoint]:
     """Turning joints of one coordinate that are far lighter than the heaviest, by name.
 
-    The value is the least M_jj at four fixed random configurations, armature included, in [kg m^2];
-    light is below LIGHT_SHARE of the largest M_jj.
+    Their inertia is the least M_jj at four fixed random configurations, armature included; light is
+    below LIGHT_SHARE of the largest M_jj.
     """
     joints = [
         (str(name), joint.idx_v)
@@ -121,4 +121,8 @@ def light_joints(model: pin.Model) -> dict[str, float]:
     samples = np.array(list(_sample_configurations(model)))
     inertia = np.diagonal(MassMatrix(model)(samples), axis1=1, axis2=2)  # (samples, nv)
     least, most = inertia.min(axis=0), inertia[:, [i for _, i in joints]].max()
-    return {name: float(least[i]) for name, i in joints if least[i] < LIGHT_SHARE * most}
+    return {
+        name: LightJoint(float(least[i]), float(LIGHT_SHARE * most - least[i]))
+        for name, i in joints
+        if least[i] < LIGHT_SHARE * most
+    }

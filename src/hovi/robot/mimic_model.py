@@ -14,7 +14,7 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from hovi.errors import ModelError
-from hovi.robot.reordered_model import axis, continuous_joint, rebuilt
+from hovi.robot.space.reordered_model import axis, continuous_joint, rebuilt
 from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]

@@ -14,7 +14,7 @@ import pinocchio as pin
 
 from hovi.errors import ModelError
 from hovi.robot.mimic_model import REMEDY, Coupling, check_coupling, coupled
-from hovi.robot.reordered_model import axis, continuous_joint, rebuilt
+from hovi.robot.space.reordered_model import axis, continuous_joint, rebuilt
 from hovi.robot.urdf.check import checked_urdf
 
 _NO_LIMIT = float(np.finfo(float).max)

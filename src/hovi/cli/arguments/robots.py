@@ -24,6 +24,13 @@ XacroArgs = Annotated[
     ),
 ]
 
+Mimic = Annotated[bool, typer.Option("--mimic", help="Apply the <mimic> tags of the URDF.")]
+FreeFlyer = Annotated[bool, typer.Option("--free-flyer", help="Give the robot a floating base.")]
+Srdf = Annotated[
+    Path | None, typer.Option("--srdf", help="An SRDF of the robot.", metavar="FILE.srdf")
+]
+JsonObject = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
+
 
 def robot_of(
     robot: str,
@@ -31,6 +38,7 @@ def robot_of(
     free_flyer: bool,
     package_dirs: Sequence[Path],
     xacro_args: Sequence[str],
+    srdf: Path | None = None,
 ) -> Robot:
     """The robot of a file or a name. Raises InputError for an argument without `:=`."""
     from hovi.robot.loading import load_robot
@@ -44,5 +52,6 @@ def robot_of(
         mimic=mimic,
         free_flyer=free_flyer or None,
         package_dirs=package_dirs,
+        srdf=srdf,
         xacro_args={name: value for name, _, value in pairs},
     )

@@ -4,11 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, NoReturn
 
 import typer
 
-from hovi.cli.arguments.robots import PackageDirs, XacroArgs, robot_of
+from hovi.cli.arguments.robots import (
+    FreeFlyer,
+    JsonObject,
+    Mimic,
+    PackageDirs,
+    Srdf,
+    XacroArgs,
+    robot_of,
+)
+
+if TYPE_CHECKING:
+    from hovi.robot.robot import Robot
 
 
 def info(
@@ -20,16 +31,21 @@ def info(
             "scene's name or a motion; without it, all names are listed.",
         ),
     ] = None,
-    mimic: Annotated[
-        bool, typer.Option("--mimic", help="Apply the <mimic> tags of the URDF.")
-    ] = False,
-    free_flyer: Annotated[
-        bool, typer.Option("--free-flyer", help="Give the robot a floating base.")
-    ] = False,
+    mimic: Mimic = False,
+    free_flyer: FreeFlyer = False,
     package_dir: PackageDirs = None,
     xacro_arg: XacroArgs = None,
+    srdf: Srdf = None,
+    check: Annotated[
+        bool,
+        typer.Option("--check", help="List what will hurt instead, with the lines to write."),
+    ] = False,
+    json: JsonObject = False,
 ) -> None:
-    """Describe a robot, a scene and the effects that it leaves out, or a motion."""
+    """Describe a robot, a scene and the effects that it leaves out, or a motion.
+
+    With --check the exit code is 1 if something stops a plan, and 0 otherwise.
+    """
     from hovi.errors import InputError, nearest
     from hovi.robot.bundled_models import example_scenes
     from hovi.robot.example_robots import example_names
@@ -37,15 +53,22 @@ def info(
     from hovi.robot.loading import is_path
 
     robots, scenes = example_names(), example_scenes()
+    if json and not check:
+        raise InputError("--json is for --check: hovi info ROBOT --check --json.")
+    if check and (what is None or what.lower().endswith(".npz")):
+        raise InputError("--check is about a robot: give its file or name, or a scene.")
     if what is None:
         print(_listed("robots of example-robot-data", robots))
         print(_listed("scenes that ship with hovi", scenes))
     elif what.lower().endswith(".toml") or what in scenes:
-        print(_scene(what))
+        _scene(what, check, json)
     elif what.lower().endswith(".npz"):
         print(_motion(what))
     elif is_path(what) or what in robots or format_of(what) == "description":
-        print(robot_of(what, mimic, free_flyer, package_dir or (), xacro_arg or ()).describe())
+        robot = robot_of(what, mimic, free_flyer, package_dir or (), xacro_arg or (), srdf)
+        if check:
+            _examine(robot, json)
+        print(robot.describe())
     else:
         raise InputError(
             f"there is no robot or scene {what!r}; {nearest(what, (*robots, *scenes))} "
@@ -60,12 +83,29 @@ def _listed(title: str, names: Sequence[str]) -> str:
     return f"{title}:\n{lines}\n"
 
 
-def _scene(scene: str) -> str:
+def _scene(scene: str, check: bool, json: bool) -> None:
     from hovi.cli.arguments.files import find_scene
     from hovi.cli.reports.task import describe_task
     from hovi.planning.task_file.reading import load_task
 
-    return describe_task(load_task(find_scene(scene)))
+    task = load_task(find_scene(scene))
+    if check:
+        _examine(task.scene.robot, json)
+    print(describe_task(task))
+
+
+def _examine(robot: Robot, json: bool) -> NoReturn:
+    """Print what will hurt about a robot, and exit."""
+    import json as json_text
+
+    from hovi.cli.reports.findings import findings_json, findings_of, print_findings, stops
+
+    found = findings_of(robot)
+    if json:
+        print(json_text.dumps(findings_json(robot, found)))
+    else:
+        print_findings(robot, found)
+    raise typer.Exit(1 if stops(found) else 0)
 
 
 def _motion(file: str) -> str:

@@ -17,6 +17,7 @@ from hovi.cli.reports.segments import segment_lines, segments_json
 from hovi.cli.reports.terminal_table import print_table
 from hovi.discrete.measures.motion_extremes import extremes
 from hovi.discrete.output.caution import STATUS, WARNED, cautions_of
+from hovi.errors import some_of
 from hovi.planning.refinement.certificate import Certificate
 from hovi.planning.solver.outcome.margins import LimitMargins
 from hovi.planning.solver.solver import Solution
@@ -166,8 +167,7 @@ def _summary(
     rows += segment_lines(solution, margins.segments)
     if len(solution.minima) > 1:
         costs = [f"{cost:.6g}" for cost in solution.minima]
-        more = f" and {len(costs) - 6} more" if len(costs) > 6 else ""
-        rows.append(("minima", f"{len(costs)}: {', '.join(costs[:6])}{more}"))
+        rows.append(("minima", f"{len(costs)}: {some_of(costs, 6)}"))
     return rows
 
 

@@ -50,6 +50,11 @@ def pairs_left_out(robot: Robot, may_touch: tuple[tuple[str, str], ...] = ()) ->
     return found + ([_sentence(robot, of_grasped, advice)] if of_grasped else [])
 
 
+def touching_links(robot: Robot) -> tuple[tuple[str, str], ...]:
+    """The pairs of links that overlap at every configuration. Raises ModelError without shapes."""
+    return _split_pairs(robot)[1]
+
+
 @lru_cache(maxsize=16)
 def can_keep_apart(robot: Robot, may_touch: tuple[tuple[str, str], ...] = ()) -> bool:
     """Whether a robot has all of its collision shapes, and links that can be kept apart."""

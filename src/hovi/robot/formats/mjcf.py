@@ -12,6 +12,7 @@ from pathlib import Path
 import pinocchio as pin
 
 from hovi.errors import ModelError, warn
+from hovi.robot.findings.loops import open_loops
 from hovi.robot.formats.mjcf_assets import Meshes
 from hovi.robot.formats.mjcf_bodies import Bodies
 from hovi.robot.formats.mjcf_defaults import Defaults, compiler_of
@@ -65,9 +66,5 @@ def _model(path: Path, locked: frozenset[str]) -> MjcfModel:
     shapes = [shapes_of(bodies, kind) for kind in ("visual", "collision")]
     notes += [problem for _, problem in shapes if problem]
     if ties := loops(root, locked):
-        warn(
-            f"MJCF {path.name!r}: its joints move freely, without {', '.join(ties[:3])}"
-            f"{f' and {len(ties) - 3} more' if len(ties) > 3 else ''}: lock the joints that these "
-            "tie, or plan for a robot without them."
-        )
+        warn(open_loops(f"MJCF {path.name!r}", "joints", ties))
     return MjcfModel(bodies.model, shapes[0][0], shapes[1][0], tuple(notes))

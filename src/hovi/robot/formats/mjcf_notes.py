@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from xml.etree.ElementTree import Element
 
-from hovi.errors import nearest
+from hovi.errors import nearest, some_of
 from hovi.robot.formats.mjcf_defaults import Defaults, sections
 from hovi.robot.formats.mjcf_text import MjcfError, name_of
 
@@ -92,18 +92,18 @@ ENDS = "body1", "body2", "joint1", "joint2", "tendon1", "tendon2", "site1", "sit
 def notes_of(root: Element, defaults: Defaults) -> Iterator[str]:
     """What is not read, one sentence without a full stop each."""
     if found := loops(root):
-        yield f"not kept, so that its bodies move freely: {_some(found)}"
+        yield f"not kept, so that its bodies move freely: {some_of(found, 6)}"
     yield from _values(root, defaults)
     tendons = [name_of(each) for each in sections(root, "tendon")]
     if tendons:
-        yield f"not read: {_some(tendons)}"
+        yield f"not read: {some_of(tendons, 6)}"
     actuators = [_actuator(each) for each in sections(root, "actuator")]
     if actuators:
-        yield f"not read, give their ranges as limits: {_some(actuators)}"
+        yield f"not read, give their ranges as limits: {some_of(actuators, 6)}"
     excluded = [each for each in sections(root, "contact") if each.tag == "exclude"]
     if excluded:
         pairs = [f"{each.get('body1')!r} and {each.get('body2')!r}" for each in excluded]
-        yield f"not read, name them in an SRDF: pairs that may touch, {_some(pairs)}"
+        yield f"not read, name them in an SRDF: pairs that may touch, {some_of(pairs, 6)}"
     for tag, what in (
         ("keyframe", "keyframes"),
         ("deformable", "deformables"),
@@ -111,7 +111,7 @@ def notes_of(root: Element, defaults: Defaults) -> Iterator[str]:
     ):
         names = [repr(each.get("name", each.get("plugin", ""))) for each in sections(root, tag)]
         if names:
-            yield f"not read: {what} {_some(names)}"
+            yield f"not read: {what} {some_of(names, 6)}"
 
 
 def _values(root: Element, defaults: Defaults) -> Iterator[str]:
@@ -130,7 +130,7 @@ def _values(root: Element, defaults: Defaults) -> Iterator[str]:
     ):
         names = [name_of(each) for each in bodies if each.get(key, "0") not in ("0", "false")]
         if names:
-            yield f"{key}= is not read, {what} {_some(names)}"
+            yield f"{key}= is not read, {what} {some_of(names, 6)}"
     joints = [
         (each, defaults.of(each, "")) for each in root.iter("joint") if not each.get("joint1")
     ]
@@ -141,7 +141,7 @@ def _values(root: Element, defaults: Defaults) -> Iterator[str]:
             if given.get(key, "0").strip("0. ") not in ("", "false")
         ]
         if names:
-            yield f"{key}= is not read, give the effect joint_springs: {_some(names)}"
+            yield f"{key}= is not read, give the effect joint_springs: {some_of(names, 6)}"
 
 
 def _floats(text: str) -> list[float]:
@@ -157,9 +157,3 @@ def _actuator(element: Element) -> str:
     ranges = [f"{key} {element.get(key, '')[:40]}" for key in keys if element.get(key)]
     where = element.get("joint") or element.get("tendon") or element.get("site") or ""
     return f"<{element.tag}> of {where!r}" + (f" ({', '.join(ranges)})" if ranges else "")
-
-
-def _some(names: list[str]) -> str:
-    """At most six of them, and how many more."""
-    rest = len(names) - 6
-    return ", ".join(names[:6]) + (f" and {rest} more" if rest > 0 else "")

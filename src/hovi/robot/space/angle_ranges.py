@@ -21,6 +21,15 @@ LOOKS_LIKE_DEGREES = "looks like degrees"
 """What every clause about an angle says."""
 
 
+def which_in_degrees(
+    angles: npt.NDArray[np.bool_], lower: Array, upper: Array
+) -> npt.NDArray[np.intp]:
+    """The indices of ranges that look like degrees; arguments as for `ranges_in_degrees`."""
+    sizes = np.abs(np.stack([lower, upper]))
+    suspicious = (sizes > MIN_SUSPICIOUS) & (sizes <= MAX_SUSPICIOUS)
+    return np.flatnonzero(angles & suspicious.any(axis=0))
+
+
 def ranges_in_degrees(
     names: Sequence[str], angles: npt.NDArray[np.bool_], lower: Array, upper: Array
 ) -> str:
@@ -28,9 +37,7 @@ def ranges_in_degrees(
 
     names: of the coordinates, (nv,). angles: which are angles, (nv,). lower, upper: in [rad].
     """
-    sizes = np.abs(np.stack([lower, upper]))
-    suspicious = (sizes > MIN_SUSPICIOUS) & (sizes <= MAX_SUSPICIOUS)
-    found = np.flatnonzero(angles & suspicious.any(axis=0))
+    found = which_in_degrees(angles, lower, upper)
     if not len(found):
         return ""
     i = int(found[0])

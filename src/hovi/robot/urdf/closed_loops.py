@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from xml.etree.ElementTree import Element
 
+from hovi.system.dataclass import dataclass
+
 TIES = (
     "loop_joint",
     "drake:ball_constraint",
@@ -18,10 +20,23 @@ _NAMED_PARTS = "drake:bushing_frameA", "drake:bushing_frameC"
 _TEXT_PARTS = "parent", "child"
 
 
-def closed_loops(robot: Element) -> list[str]:
-    """What ties links or joints of a URDF together and is not read, by element and ends."""
+@dataclass(frozen=True)
+class Tie:
+    """What ties two links or joints together and is not read: its element, and their names."""
+
+    tag: str
+    ends: tuple[str, ...]
+
+    @property
+    def text(self) -> str:
+        """It, in a sentence."""
+        return f"<{self.tag}> of {' and '.join(map(repr, self.ends))}"
+
+
+def closed_loops(robot: Element) -> list[Tie]:
+    """What ties links or joints of a URDF together and is not read."""
     ties = [tie for path in TIES for tie in _at(robot, path.split("/"))]
-    return [_in_words(tie) for tie in ties if tie.get("active") != "false"]
+    return [_tie(tie) for tie in ties if tie.get("active") != "false"]
 
 
 def _at(element: Element, path: list[str]) -> Iterator[Element]:
@@ -31,9 +46,9 @@ def _at(element: Element, path: list[str]) -> Iterator[Element]:
             yield from _at(child, path[1:]) if path[1:] else (child,)
 
 
-def _in_words(tie: Element) -> str:
-    ends = [end[:40] for end in _ends(tie) if end]
-    return f"<{tie.tag[:40]}> of {' and '.join(map(repr, ends)) or repr(tie.get('name', ''))}"
+def _tie(tie: Element) -> Tie:
+    ends = tuple(end[:40] for end in _ends(tie) if end)
+    return Tie(tie.tag[:40], ends or (tie.get("name", ""),))
 
 
 def _ends(tie: Element) -> Iterator[str]:

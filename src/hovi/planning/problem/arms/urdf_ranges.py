@@ -8,14 +8,12 @@ from xml.etree.ElementTree import Element
 import numpy as np
 import numpy.typing as npt
 
-from hovi.errors import InputError
+from hovi.errors import InputError, some_of
 from hovi.robot.robot import Robot
 from hovi.robot.urdf.check import checked_urdf
 
 Array = npt.NDArray[np.float64]
 Range = tuple[float, float]
-_SHOWN = 4
-"""Names in a sentence."""
 
 
 def require_ranges(robot: Robot, others: Collection[int] = ()) -> None:
@@ -23,19 +21,17 @@ def require_ranges(robot: Robot, others: Collection[int] = ()) -> None:
 
     others: coordinates that have a range of their own.
     """
-    if robot.unplanned_joints:
-        return
-    iq, iv = robot.space.plain
-    empty = np.asarray(iv)[robot.upper[iq] <= robot.lower[iq]]
-    names = [robot.coordinate_names[i] for i in empty if i not in others]
+    names = [
+        robot.coordinate_names[i]
+        for i, (lower, upper) in _stated(robot).items()
+        if upper <= lower and i not in others
+    ]
     if not names:
         return
-    some = ", ".join(map(repr, names[:_SHOWN]))
-    more = f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else ""
     joints, have = ("joints", "have") if len(names) > 1 else ("joint", "has")
     raise InputError(
-        f"{joints} {some}{more} of robot {robot.name!r} {have} an empty position range in the "
-        "URDF: lock such joints (locked=), make their type continuous, "
+        f"{joints} {some_of(map(repr, names))} of robot {robot.name!r} {have} an empty "
+        "position range in the URDF: lock such joints (locked=), make their type continuous, "
         f'or give their ranges, such as limits={{"q": {{{names[0]!r}: [-3.14, 3.14]}}}}.'
     )
 
@@ -46,35 +42,37 @@ def position_ranges(robot: Robot, soft: bool = False) -> tuple[Array, Array]:
     soft: whether joints have those of their safety controllers.
     """
     lower, upper = np.full(robot.nv, -np.inf), np.full(robot.nv, np.inf)
-    if not robot.unplanned_joints:
-        iq, iv = robot.space.plain
-        lower[iv], upper[iv] = robot.lower[iq], robot.upper[iq]
-    for name, pair in _soft_ranges(robot).items() if soft else ():
-        i = robot.coordinate_names.index(name)
+    for i, pair in {**_stated(robot), **(_soft_ranges(robot) if soft else {})}.items():
         lower[i], upper[i] = pair
     empty = lower >= upper
     return np.where(empty, -np.inf, lower), np.where(empty, np.inf, upper)
 
 
-def _soft_ranges(robot: Robot) -> dict[str, Range]:
-    """The ranges of safety controllers that lie inside those of the joints, by coordinate.
+def _stated(robot: Robot) -> dict[int, Range]:
+    """The ranges of the URDF by the index in v of joints with plain positions."""
+    if robot.unplanned_joints:
+        return {}
+    iq, iv = robot.space.plain
+    return {v: (float(robot.lower[q]), float(robot.upper[q])) for q, v in zip(iq, iv, strict=True)}
+
+
+def _soft_ranges(robot: Robot) -> dict[int, Range]:
+    """The ranges of safety controllers that lie inside those of the joints, by index in v.
 
     Of joints with one position. A controller whose soft limits are both zero,
     which is what URDF takes for missing ones, has none. Raises InputError where there is none.
     """
-    iq, iv = robot.space.plain
-    pairs = zip(iq, iv, strict=True)
-    given = {robot.coordinate_names[v]: (robot.lower[q], robot.upper[q]) for q, v in pairs}
-    found = {}
+    given, found = _stated(robot), dict[int, Range]()
+    numbers = {name: i for i, name in enumerate(robot.coordinate_names)}
     for joint in _joints(robot):
-        controller, name = joint.find("safety_controller"), joint.get("name", "")
-        if controller is None or name not in given:
+        controller, i = joint.find("safety_controller"), numbers.get(joint.get("name", ""), -1)
+        if controller is None or i not in given:
             continue
         keys = "soft_lower_limit", "soft_upper_limit"
         soft = [float(controller.get(key, "0")) for key in keys]
-        lower, upper = max(soft[0], given[name][0]), min(soft[1], given[name][1])
+        lower, upper = max(soft[0], given[i][0]), min(soft[1], given[i][1])
         if any(soft) and lower < upper:
-            found[name] = (float(lower), float(upper))
+            found[i] = (float(lower), float(upper))
     if not found:
         raise InputError(
             f"the URDF of robot {robot.name!r} has no <safety_controller> with soft limits: use "

@@ -1,0 +1,49 @@
+"""What was found about a robot's file, and the line that mends it."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+
+from hovi.system.dataclass import dataclass
+
+SRDF, PYTHON, COMMAND_LINE = "SRDF", "Python", "command line"
+"""Where a line is written that is no element of the URDF."""
+
+
+class Severity(StrEnum):
+    """What a finding does to a plan, the worst first."""
+
+    STOPS = "stops"
+    MISLEADS = "misleads"
+    HINT = "hint"
+    NOTE = "note"
+
+
+@dataclass(frozen=True)
+class Line:
+    """A line to write.
+
+    where: the path of the element of the URDF in which it replaces the element of its tag, as
+        XPath from <robot>; "." for one that is added to the robot itself; or SRDF, PYTHON,
+        COMMAND_LINE.
+    """
+
+    where: str
+    text: str
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What was found.
+
+    severity: a plan stops at it; or is for another robot than meant; or may be a poor one; or it is
+        good to know.
+    kind: of finding, a word for programs. subject: names of the joints, links or frames.
+    sentence: what was found, and what to do. lines: to write, for example; none without one.
+    """
+
+    severity: Severity
+    kind: str
+    subject: tuple[str, ...]
+    sentence: str
+    lines: tuple[Line, ...] = ()

@@ -1,0 +1,144 @@
+"""Inertias: none, those of no body, and those of links that are far lighter than the arm."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from xml.etree.ElementTree import Element
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi.errors import some_of
+from hovi.robot.findings.boxes import ShapeBox, quoted
+from hovi.robot.findings.finding import PYTHON, Finding, Line, Severity
+from hovi.robot.findings.subject import Subject
+
+Array = npt.NDArray[np.float64]
+
+DENSITY = 1_000.0
+"""Of a box around a shape, in [kg/m^3], of which an example of an inertia is made."""
+SMALL = 0.05
+"""The side of such a box of a link without shapes, in [m]."""
+_AT = {"ixx": (0, 0), "ixy": (0, 1), "ixz": (0, 2), "iyy": (1, 1), "iyz": (1, 2), "izz": (2, 2)}
+
+
+def no_inertia(subject: Subject) -> Iterator[Finding]:
+    """Joints without inertia, at which there are no torques."""
+    if not subject.massless:
+        return
+    joints = tuple(str(subject.model.names[i]) for i in subject.massless)
+    links = [link for i in subject.massless for link in subject.bodies.get(i, ())[:1]]
+    lines = tuple(_inertial(subject, link) for link in links)
+    yield Finding(
+        Severity.STOPS,
+        "no-inertia",
+        joints,
+        f"no inertia at {some_of(joints)}: there are no torques; give the links that they move a "
+        'mass and an inertia, or plan with objective = "acceleration"',
+        lines or (Line(PYTHON, 'objective="acceleration"'),),
+    )
+
+
+def bare_links(subject: Subject) -> Iterator[Finding]:
+    """Links that move without <inertial>, where others give the joint its inertia."""
+    found = [x.get("name", "") for x in subject.moving_links() if x.find("inertial") is None]
+    if found:
+        yield Finding(
+            Severity.HINT,
+            "no-inertial",
+            tuple(found),
+            f"{some_of(found)}: moving without <inertial>, so without mass and inertia",
+            tuple(_inertial(subject, link) for link in found),
+        )
+
+
+def impossible(subject: Subject) -> Iterator[Finding]:
+    """Inertias that no body has: a principal one exceeds the sum of the others."""
+    tensors = {name: tensor_of(link) for name, link in subject.links.items()}
+    odd = {name: x for name, x in tensors.items() if x is not None and _breaks_triangle(x)}
+    if odd:
+        yield Finding(
+            Severity.MISLEADS,
+            "impossible-inertia",
+            tuple(odd),
+            f"the principal inertias of {some_of(odd)} violate the triangle inequality",
+            tuple(
+                Line(f"link[@name={quoted(name)}]/inertial", inertia_text(_nearest_possible(x)))
+                for name, x in odd.items()
+            ),
+        )
+
+
+def light_joints(subject: Subject) -> Iterator[Finding]:
+    """Joints with so little inertia that costs range over many decades."""
+    if light := subject.light:
+        shown = some_of([f"{name} ({each.inertia:.2g} kg m^2)" for name, each in light.items()])
+        rotors = ", ".join(f'"{name}": {_above(each.armature):g}' for name, each in light.items())
+        yield Finding(
+            Severity.HINT,
+            "light-joint",
+            tuple(light),
+            f"little inertia about {shown}: without limits or the effects armature and "
+            "acceleration_cost a least-torque motion may whirl there",
+            (Line(PYTHON, f"hovi.effects.Armature({{{rotors}}})"),),
+        )
+
+
+def tensor_of(link: Element) -> Array | None:
+    """The inertia tensor of a link of the URDF, (3, 3), in [kg m^2]."""
+    inertia = link.find("inertial/inertia")
+    if inertia is None:
+        return None
+    tensor = np.zeros((3, 3))
+    for key, (i, j) in _AT.items():
+        tensor[i, j] = tensor[j, i] = float(inertia.get(key, "0"))
+    return tensor
+
+
+def inertia_text(tensor: Array) -> str:
+    """An inertia tensor as <inertia>."""
+    values = " ".join(f'{key}="{tensor[at]:.6g}"' for key, at in _AT.items())
+    return f"<inertia {values}/>"
+
+
+def _breaks_triangle(tensor: Array) -> bool:
+    """Whether one principal inertia exceeds the sum of the two others by more than 1 %."""
+    low, middle, high = np.linalg.eigvalsh(tensor)
+    return bool(high > 1.01 * (low + middle) + 1e-9)
+
+
+def _nearest_possible(tensor: Array) -> Array:
+    """The inertia of the nearest distribution of mass P >= 0, with I = tr(P) 1 - P."""
+    values, axes = np.linalg.eigh(np.trace(tensor) / 2 * np.eye(3) - tensor)
+    spread = (axes * np.maximum(values, 0.0)) @ axes.T
+    return np.asarray(np.trace(spread) * np.eye(3) - spread)
+
+
+def _inertial(subject: Subject, link: str) -> Line:
+    """An example of a link's <inertial>: boxes around its shapes, of DENSITY."""
+    boxes = [x for x in subject.boxes if x.link == link and len(x.corners)]
+    kind = "collision" if any(x.kind == "collision" for x in boxes) else "visual"
+    mass, center, tensor = _solid([x for x in boxes if x.kind == kind])
+    at = " ".join(f"{x:.4g}" for x in center)
+    text = f'<inertial><origin xyz="{at}"/><mass value="{mass:.4g}"/>{inertia_text(tensor)}'
+    return Line(f"link[@name={quoted(link)}]", f"{text}</inertial>")
+
+
+def _solid(boxes: Iterable[ShapeBox]) -> tuple[float, Array, Array]:
+    """Mass, center (3,) and inertia (3, 3) about it of boxes along the axes of a link."""
+    sides = [(x.corners.min(axis=0), x.corners.max(axis=0)) for x in boxes]
+    half = SMALL / 2 * np.ones(3)
+    sides = [(low, high) for low, high in sides if np.prod(high - low) > 1e-9] or [(-half, half)]
+    masses = np.array([DENSITY * np.prod(high - low) for low, high in sides])
+    middles = np.array([(low + high) / 2 for low, high in sides])
+    center, tensor = masses @ middles / masses.sum(), np.zeros((3, 3))
+    for mass, middle, (low, high) in zip(masses, middles, sides, strict=True):
+        spread = np.outer(middle - center, middle - center) + np.diag((high - low) ** 2 / 12)
+        tensor += mass * (np.trace(spread) * np.eye(3) - spread)
+    return float(masses.sum()), np.asarray(center), tensor
+
+
+def _above(value: float) -> float:
+    """The next larger number of two digits."""
+    step = 10.0 ** (np.floor(np.log10(value)) - 1) if value > 0 else 1.0
+    return float(np.ceil(value / step) * step)

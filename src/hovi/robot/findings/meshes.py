@@ -1,0 +1,87 @@
+"""Meshes that are missing, or in millimetres."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+from hovi.errors import some_of
+from hovi.robot.findings.boxes import ShapeBox
+from hovi.robot.findings.finding import COMMAND_LINE, Finding, Line, Severity
+from hovi.robot.findings.subject import Subject
+
+HUGE = 20.0
+"""Size of a mesh over the reach of the robot from which it looks like millimetres."""
+LEAST = 5.0
+"""Size of a mesh, in [m], below which it never does."""
+ODD = 2.0
+"""The same ratio from which other meshes of such a robot are in the same unit."""
+TINY = 0.02
+"""The ratio of the largest mesh below which the unit is the centimetre."""
+
+
+def missing_meshes(subject: Subject, folder_of: Callable[[str], str]) -> Iterator[Finding]:
+    """Shapes whose meshes cannot be used. folder_of: the package folder of a mesh's file, or ""."""
+    lost = [box for box in subject.boxes if box.problem]
+    if not lost:
+        return
+    links = tuple(dict.fromkeys(box.link for box in lost))
+    collide = sum(box.kind == "collision" for box in lost)
+    effect = "links are drawn without them"
+    if collide:
+        effect = "links are not kept apart, and obstacles are refused"
+    problem = lost[0].problem.removesuffix(".")
+    yield Finding(
+        Severity.MISLEADS if collide else Severity.HINT,
+        "mesh",
+        links,
+        f"{len(lost)} of {sum(bool(box.mesh) for box in subject.boxes)} meshes cannot be used, so "
+        f"that {effect}, at {some_of(links)}: {problem}",
+        tuple(dict.fromkeys(_folder_line(box, folder_of) for box in lost)),
+    )
+
+
+def _folder_line(box: ShapeBox, folder_of: Callable[[str], str]) -> Line:
+    package = box.mesh.partition("://")[2].lstrip("/").partition("/")[0]
+    folder = folder_of(box.mesh) or f"FOLDER_OF_{package or 'MESHES'}"
+    return Line(COMMAND_LINE, f"--package-dir {folder}")
+
+
+def large_meshes(subject: Subject) -> Iterator[Finding]:
+    """Meshes that are many times as large as the arm."""
+    reach = subject.reach
+    meshes = [box for box in subject.boxes if box.mesh]
+    largest = max(meshes, key=lambda box: box.extent, default=None)
+    if largest is None or not 0.0 < max(HUGE * reach, LEAST) < largest.extent or not reach:
+        return
+    factor, unit = 1e-3, "millimetres"
+    if largest.extent * factor < TINY * reach:
+        factor, unit = 1e-2, "centimetres"
+    odd = [box for box in meshes if box.extent > ODD * reach]
+    yield Finding(
+        Severity.MISLEADS,
+        "mesh-unit",
+        tuple(dict.fromkeys(box.link for box in odd)),
+        f"the mesh of {largest.link}, {largest.extent:.3g} m on a robot that reaches "
+        f"{reach:.2g} m, looks like {unit}: write its scale",
+        tuple(_scale_line(box, factor) for box in odd),
+    )
+
+
+def _scale_line(box: ShapeBox, factor: float) -> Line:
+    scale = " ".join(f"{factor * x:g}" for x in box.scale)
+    return Line(box.where, f'<mesh filename="{box.mesh}" scale="{scale}"/>')
+
+
+def no_shapes(subject: Subject) -> Iterator[Finding]:
+    """A robot without collision shapes cannot be kept from obstacles, nor its links apart."""
+    if subject.urdf is None or any(box.kind == "collision" for box in subject.boxes):
+        return
+    links = [name for i, names in subject.bodies.items() if i for name in names[:1]]
+    box = '<collision><geometry><box size="0.1 0.1 0.1"/></geometry></collision>'
+    yield Finding(
+        Severity.HINT,
+        "no-collision-shapes",
+        tuple(links),
+        "no link has <collision>: links are not kept apart, and obstacles are refused",
+        tuple(Line(f"link[@name='{link}']", box) for link in links),
+    )
