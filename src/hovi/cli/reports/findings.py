@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
-from hovi.robot.findings.finding import SRDF, Finding, Line, Severity
+from hovi.robot.findings.finding import SRDF, Finding, Line, Severity, element
 
 if TYPE_CHECKING:
     from hovi.robot.robot import Robot
@@ -27,8 +27,8 @@ def findings_of(robot: Robot) -> tuple[Finding, ...]:
     from hovi.robot.file_findings import file_findings, in_order
 
     found = file_findings(robot.model, robot.source, robot.tip_frames)
-    has_meshes = all(each.kind != "mesh" for each in found)
-    if has_meshes and not robot.unplanned_joints:
+    has_shapes = all(each.kind not in ("mesh", "mesh-unit") for each in found)
+    if has_shapes and not robot.unplanned_joints:
         found = in_order([*found, *_collisions(robot)])
     return tuple(each for each in found if each.severity in _HEADINGS)
 
@@ -53,7 +53,7 @@ def _collisions(robot: Robot) -> Iterator[Finding]:
             f"collision shapes overlap at every configuration, of {shown}: they are not kept "
             "apart; disable such pairs in an SRDF",
             tuple(
-                Line(SRDF, f'<disable_collisions link1="{a}" link2="{b}" reason="Always"/>')
+                Line(SRDF, element("disable_collisions", {"link1": a, "link2": b}))
                 for a, b in pairs
             ),
         )
@@ -92,14 +92,18 @@ def print_findings(robot: Robot, findings: tuple[Finding, ...]) -> None:
     count = f"{len(findings)} finding{'' if len(findings) == 1 else 's'}"
     which = "" if stops(findings) else ", none of which stops a plan"
     print(f"{robot.name}: {count}{which}. Goals may name the frame {tips}.")
+    printed = set[str]()
     for severity, heading in _HEADINGS.items():
         found = [each for each in findings if each.severity is severity]
         if found:
             print(f"\n{heading}:")
         for each in found:
             print(f"- {each.sentence}")
-            for line in _shown(each.lines):
+            lines = list(_shown(each.lines))
+            again = bool(lines) and printed.issuperset(lines)
+            for line in ("the lines above",) if again else lines:
                 print(f"    {line}")
+            printed.update(lines)
 
 
 def _shown(lines: tuple[Line, ...]) -> Iterator[str]:

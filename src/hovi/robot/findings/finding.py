@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from enum import StrEnum
+from xml.sax.saxutils import quoteattr
 
 from hovi.system.dataclass import dataclass
 
@@ -30,6 +32,12 @@ class Line:
 
     where: str
     text: str
+
+
+def element(tag: str, attributes: Mapping[str, str], *inside: str) -> str:
+    """The text of an element. inside: texts of the elements in it."""
+    words = " ".join([tag, *(f"{key}={quoteattr(x)}" for key, x in attributes.items())])
+    return f"<{words}>{''.join(inside)}</{tag}>" if inside else f"<{words}/>"
 
 
 @dataclass(frozen=True)

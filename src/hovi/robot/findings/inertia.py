@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from hovi.errors import some_of
 from hovi.robot.findings.boxes import ShapeBox, quoted
-from hovi.robot.findings.finding import PYTHON, Finding, Line, Severity
+from hovi.robot.findings.finding import PYTHON, Finding, Line, Severity, element
 from hovi.robot.findings.subject import Subject
 
 Array = npt.NDArray[np.float64]
@@ -19,6 +19,8 @@ DENSITY = 1_000.0
 """Of a box around a shape, in [kg/m^3], of which an example of an inertia is made."""
 SMALL = 0.05
 """The side of such a box of a link without shapes, in [m]."""
+MANY = 4
+"""Number of light joints beyond which all joints get the same rotor."""
 _AT = {"ixx": (0, 0), "ixy": (0, 1), "ixz": (0, 2), "iyy": (1, 1), "iyz": (1, 2), "izz": (2, 2)}
 
 
@@ -40,16 +42,22 @@ def no_inertia(subject: Subject) -> Iterator[Finding]:
 
 
 def bare_links(subject: Subject) -> Iterator[Finding]:
-    """Links that move without <inertial>, where others give the joint its inertia."""
-    found = [x.get("name", "") for x in subject.moving_links() if x.find("inertial") is None]
-    if found:
-        yield Finding(
-            Severity.HINT,
-            "no-inertial",
-            tuple(found),
-            f"{some_of(found)}: moving without <inertial>, so without mass and inertia",
-            tuple(_inertial(subject, link) for link in found),
-        )
+    """Links that move without <inertial>: a hint where others fixed to them have no mass either."""
+    found = {x.get("name", "") for x in subject.moving_links() if x.find("inertial") is None}
+    lumped, massless = list[str](), list[str]()
+    for joint, links in subject.bodies.items():
+        if joint not in subject.massless:
+            bare = [link for link in links if link in found]
+            (lumped if subject.model.inertias[joint].mass > 0.0 else massless).extend(bare)
+    for severity, names in ((Severity.HINT, massless), (Severity.NOTE, lumped)):
+        if names:
+            yield Finding(
+                severity,
+                "no-inertial",
+                tuple(names),
+                f"{some_of(names)}: moving without <inertial>, so without mass and inertia",
+                tuple(_inertial(subject, link) for link in names),
+            )
 
 
 def impossible(subject: Subject) -> Iterator[Finding]:
@@ -71,16 +79,21 @@ def impossible(subject: Subject) -> Iterator[Finding]:
 
 def light_joints(subject: Subject) -> Iterator[Finding]:
     """Joints with so little inertia that costs range over many decades."""
-    if light := subject.light:
+    none = {str(subject.model.names[i]) for i in subject.massless}
+    light = {name: each for name, each in subject.light.items() if name not in none}
+    if light:
         shown = some_of([f"{name} ({each.inertia:.2g} kg m^2)" for name, each in light.items()])
-        rotors = ", ".join(f'"{name}": {_above(each.armature):g}' for name, each in light.items())
+        rotors = ", ".join(f"{name!r}: {_above(each.armature):g}" for name, each in light.items())
+        rotors = f"{{{rotors}}}"
+        if len(light) > MANY:
+            rotors = f"{_above(max(each.armature for each in light.values())):g}"
         yield Finding(
             Severity.HINT,
             "light-joint",
             tuple(light),
             f"little inertia about {shown}: without limits or the effects armature and "
             "acceleration_cost a least-torque motion may whirl there",
-            (Line(PYTHON, f"hovi.effects.Armature({{{rotors}}})"),),
+            (Line(PYTHON, f"hovi.effects.Armature({rotors})"),),
         )
 
 
@@ -97,8 +110,7 @@ def tensor_of(link: Element) -> Array | None:
 
 def inertia_text(tensor: Array) -> str:
     """An inertia tensor as <inertia>."""
-    values = " ".join(f'{key}="{tensor[at]:.6g}"' for key, at in _AT.items())
-    return f"<inertia {values}/>"
+    return element("inertia", {key: f"{tensor[at]:.6g}" for key, at in _AT.items()})
 
 
 def _breaks_triangle(tensor: Array) -> bool:
@@ -120,8 +132,9 @@ def _inertial(subject: Subject, link: str) -> Line:
     kind = "collision" if any(x.kind == "collision" for x in boxes) else "visual"
     mass, center, tensor = _solid([x for x in boxes if x.kind == kind])
     at = " ".join(f"{x:.4g}" for x in center)
-    text = f'<inertial><origin xyz="{at}"/><mass value="{mass:.4g}"/>{inertia_text(tensor)}'
-    return Line(f"link[@name={quoted(link)}]", f"{text}</inertial>")
+    parts = element("origin", {"xyz": at}), element("mass", {"value": f"{mass:.4g}"})
+    text = element("inertial", {}, *parts, inertia_text(tensor))
+    return Line(f"link[@name={quoted(link)}]", text)
 
 
 def _solid(boxes: Iterable[ShapeBox]) -> tuple[float, Array, Array]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from hovi.robot.findings.boxes import quoted
-from hovi.robot.findings.finding import PYTHON, Line
+from hovi.robot.findings.finding import PYTHON, Line, element
 from hovi.robot.findings.subject import Subject
 from hovi.robot.space.joint_kinds import ANGLE, kind_of
 
@@ -22,18 +22,17 @@ def limit_line(subject: Subject, joint: str, factor: float = 1.0) -> Line:
     if not lower < upper:
         half = TURN if kind_of(subject.joints[joint]).units == (ANGLE,) else STROKE
         lower, upper = -half, half
-    element = subject.elements.get(joint)
-    limit = None if element is None else element.find("limit")
-    if element is None:
-        return Line(PYTHON, f'limits={{"q": {{"{joint}": [{lower:.5g}, {upper:.5g}]}}}}')
+    joint_element = subject.elements.get(joint)
+    if joint_element is None:
+        return Line(PYTHON, f'limits={{"q": {{{joint!r}: [{lower:.5g}, {upper:.5g}]}}}}')
+    limit = joint_element.find("limit")
     stated = {} if limit is None else limit.attrib
     speed, effort = (
         stated.get(key) if float(stated.get(key, "0")) else example
         for key, example in (("velocity", SPEED), ("effort", EFFORT))
     )
-    span = f'lower="{lower:.5g}" upper="{upper:.5g}" '
-    if element.get("type") not in ("revolute", "prismatic"):
-        span = ""
-    return Line(
-        f"joint[@name={quoted(joint)}]", f'<limit {span}effort="{effort}" velocity="{speed}"/>'
-    )
+    span = {"lower": f"{lower:.5g}", "upper": f"{upper:.5g}"}
+    if joint_element.get("type") not in ("revolute", "prismatic"):
+        span = {}
+    text = element("limit", {**span, "effort": str(effort), "velocity": str(speed)})
+    return Line(f"joint[@name={quoted(joint)}]", text)

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from xml.etree.ElementTree import Element, tostring
 
 from hovi.errors import some_of
-from hovi.robot.findings.boxes import ShapeBox
-from hovi.robot.findings.finding import COMMAND_LINE, Finding, Line, Severity
+from hovi.robot.findings.boxes import ShapeBox, quoted
+from hovi.robot.findings.finding import COMMAND_LINE, Finding, Line, Severity, element
 from hovi.robot.findings.subject import Subject
 
 HUGE = 20.0
@@ -36,13 +37,13 @@ def missing_meshes(subject: Subject, folder_of: Callable[[str], str]) -> Iterato
         links,
         f"{len(lost)} of {sum(bool(box.mesh) for box in subject.boxes)} meshes cannot be used, so "
         f"that {effect}, at {some_of(links)}: {problem}",
-        tuple(dict.fromkeys(_folder_line(box, folder_of) for box in lost)),
+        tuple(dict.fromkeys(_folder_line(x, folder_of) for x in lost if "not found" in x.problem)),
     )
 
 
 def _folder_line(box: ShapeBox, folder_of: Callable[[str], str]) -> Line:
     package = box.mesh.partition("://")[2].lstrip("/").partition("/")[0]
-    folder = folder_of(box.mesh) or f"FOLDER_OF_{package or 'MESHES'}"
+    folder = folder_of(box.mesh) or (f"FOLDER_THAT_HOLDS_{package}" if package else "FOLDER")
     return Line(COMMAND_LINE, f"--package-dir {folder}")
 
 
@@ -69,19 +70,30 @@ def large_meshes(subject: Subject) -> Iterator[Finding]:
 
 def _scale_line(box: ShapeBox, factor: float) -> Line:
     scale = " ".join(f"{factor * x:g}" for x in box.scale)
-    return Line(box.where, f'<mesh filename="{box.mesh}" scale="{scale}"/>')
+    return Line(box.where, element("mesh", {"filename": box.mesh, "scale": scale}))
 
 
 def no_shapes(subject: Subject) -> Iterator[Finding]:
     """A robot without collision shapes cannot be kept from obstacles, nor its links apart."""
     if subject.urdf is None or any(box.kind == "collision" for box in subject.boxes):
         return
-    links = [name for i, names in subject.bodies.items() if i for name in names[:1]]
-    box = '<collision><geometry><box size="0.1 0.1 0.1"/></geometry></collision>'
+    shown = [box for box in subject.boxes if len(box.corners)]
+    lines = [Line(f"link[@name={quoted(x.link)}]", _collision(subject, x)) for x in shown]
+    moved = next((names[0] for i, names in subject.bodies.items() if i), "")
+    example = '<collision><geometry><box size="0.1 0.1 0.1"/></geometry></collision>'
     yield Finding(
         Severity.HINT,
         "no-collision-shapes",
-        tuple(links),
+        (),
         "no link has <collision>: links are not kept apart, and obstacles are refused",
-        tuple(Line(f"link[@name='{link}']", box) for link in links),
+        tuple(lines) or (Line(f"link[@name={quoted(moved)}]", example),),
     )
+
+
+def _collision(subject: Subject, box: ShapeBox) -> str:
+    """The visual shape of a link as a collision shape."""
+    collision = Element("collision")
+    for part in subject.links[box.link].findall("visual")[box.number - 1]:
+        if part.tag in ("origin", "geometry"):
+            collision.append(part)
+    return " ".join(tostring(collision, encoding="unicode").split())

@@ -36,7 +36,7 @@ def ambiguous_frames(subject: Subject) -> Iterator[Finding]:
 def of_reader(subject: Subject) -> Iterator[Finding]:
     """What the reader of another format noted."""
     for note in subject.notes:
-        yield Finding(Severity.HINT, "not-read", (), note)
+        yield Finding(Severity.MISLEADS, "not-read", (), note)
 
 
 def harmless(subject: Subject) -> Iterator[Finding]:

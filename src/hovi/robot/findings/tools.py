@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from hovi.errors import some_of
-from hovi.robot.findings.finding import Finding, Line, Severity
+from hovi.robot.findings.finding import Finding, Line, Severity, element
 from hovi.robot.findings.subject import Subject
 
 LONG = 0.02
@@ -19,8 +19,8 @@ def tools_without_frame(subject: Subject) -> Iterator[Finding]:
     """Tips whose only frame is at their joint, and whose shapes reach further."""
     found = {}
     for tip in subject.tips:
-        links = next((names for names in subject.bodies.values() if tip in names), ())
-        if len(links) != 1 or links[0] != tip:
+        joint, links = next((x for x in subject.bodies.items() if tip in x[1]), (0, []))
+        if links != [tip] or subject.model.joints[joint].nv != 1:
             continue
         corners = [box.corners for box in subject.boxes if box.link == tip and len(box.corners)]
         if corners and (end := _end_of(np.concatenate(corners)))[1] > LONG:
@@ -51,9 +51,7 @@ def _frame(subject: Subject, tip: str, end: np.ndarray, number: int) -> Iterator
     while name in subject.links:
         name += "_"
     at = " ".join(f"{x:.4g}" for x in end)
-    yield Line(".", f'<link name="{name}"/>')
-    yield Line(
-        ".",
-        f'<joint name="{name}_fixed" type="fixed"><parent link="{tip}"/><child link="{name}"/>'
-        f'<origin xyz="{at}"/></joint>',
-    )
+    yield Line(".", element("link", {"name": name}))
+    ends = element("parent", {"link": tip}), element("child", {"link": name})
+    joint = {"name": f"{name}_fixed", "type": "fixed"}
+    yield Line(".", element("joint", joint, *ends, element("origin", {"xyz": at})))

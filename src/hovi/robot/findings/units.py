@@ -13,7 +13,7 @@ import numpy as np
 import pinocchio as pin
 
 from hovi.robot.findings.boxes import quoted
-from hovi.robot.findings.finding import Finding, Line, Severity
+from hovi.robot.findings.finding import Finding, Line, Severity, element
 from hovi.robot.findings.inertia import inertia_text, tensor_of
 from hovi.robot.findings.subject import Subject
 
@@ -39,7 +39,7 @@ def grams(subject: Subject) -> Iterator[Finding]:
     def line(link: str) -> Iterator[Line]:
         mass = float(_attribute(subject, link, "mass", "value"))
         if mass >= HEAVY / 10:
-            yield Line(f"{_link(link)}/inertial", f'<mass value="{mass / 1e3:.6g}"/>')
+            yield Line(f"{_link(link)}/inertial", _mass(mass / 1e3))
 
     yield Finding(
         Severity.MISLEADS,
@@ -92,13 +92,17 @@ def _lines(
     return tuple(each for link in links for each in line(link))
 
 
+def _mass(value: float) -> str:
+    return element("mass", {"value": f"{value:.6g}"})
+
+
 def _link(name: str) -> str:
     return f"link[@name={quoted(name)}]"
 
 
 def _attribute(subject: Subject, link: str, tag: str, key: str) -> str:
-    element = subject.links[link].find(f"inertial/{tag}")
-    return "0" if element is None else element.get(key, "0")
+    found = subject.links[link].find(f"inertial/{tag}")
+    return "0" if found is None else found.get(key, "0")
 
 
 def _gyration(inertia: pin.Inertia) -> float:

@@ -29,11 +29,12 @@ def zero_limits(subject: Subject) -> Iterator[Finding]:
             Severity.MISLEADS,
             f"zero-{what}",
             tuple(names),
-            f"the {what} limit is 0 at {f'all {len(names)} joints' if whole else some_of(names)}",
+            f"the {what} limit is 0 at {f'all {len(names)} joints' if whole else some_of(names)}, "
+            "which counts as none",
             tuple(
                 limit_line(subject, name)
                 if name in subject.elements
-                else Line(PYTHON, f'limits={{"{key}": {{"{name}": {example}}}}}')
+                else Line(PYTHON, f'limits={{"{key}": {{{name!r}: {example}}}}}')
                 for name in names
             ),
         )

@@ -1,0 +1,294 @@
+"""`hovi doctor` finds each fault of a robot, and its line mends it; a good robot has none."""
+
+from __future__ import annotations
+
+import json
+import re
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import hovi
+from hovi.cli.application import main
+
+CUBE = """OFF
+8 6 0
+-0.1 -0.1 0
+0.1 -0.1 0
+0.1 0.1 0
+-0.1 0.1 0
+-0.1 -0.1 0.4
+0.1 -0.1 0.4
+0.1 0.1 0.4
+-0.1 0.1 0.4
+4 0 3 2 1
+4 4 5 6 7
+4 0 1 5 4
+4 1 2 6 5
+4 2 3 7 6
+4 3 0 4 7
+"""
+"""A mesh file."""
+
+
+def link(name: str, mass: float, shape: str, z: float = 0.15) -> str:
+    """A link of the arm with a shape that is drawn and touches."""
+    at = f'<origin xyz="0 0 {z}"/>'
+    both = "".join(
+        f"<{kind}>{at if 'box' in shape else ''}<geometry>{shape}</geometry></{kind}>"
+        for kind in ("visual", "collision")
+    )
+    moment = f"{mass / 100:g}"
+    return f"""<link name="{name}"><inertial>{at}<mass value="{mass:g}"/><inertia ixx="{moment}"
+ixy="0" ixz="0" iyy="{moment}" iyz="0" izz="{moment}"/></inertial>{both}</link>
+"""
+
+
+def joint(name: str, kind: str, parent: str, child: str, z: float, limit: str) -> str:
+    """A joint of the arm."""
+    return f"""<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>
+<origin xyz="0 0 {z}"/><axis xyz="0 1 0"/><limit {limit} effort="50" velocity="3"/></joint>
+"""
+
+
+BOX = '<box size="0.1 0.1 0.2"/>'
+ANGLE = 'lower="-2" upper="1.9"'
+TOOL = """<link name="tool"/><joint name="tool_fixed" type="fixed"><parent link="c"/>
+<child link="tool"/><origin xyz="0 0 0.25"/></joint>"""
+GOOD = (
+    '<robot name="arm">\n'
+    + link("base", 5, BOX, -0.3)
+    + link("a", 3, '<mesh filename="package://shapes/a.off"/>')
+    + link("b", 2, BOX)
+    + link("c", 1, BOX.replace("0.2", "0.21"))
+    + joint("j1", "prismatic", "base", "a", 0, 'lower="0" upper="0.5"')
+    + joint("j2", "revolute", "a", "b", 0.5, ANGLE)
+    + joint("j3", "revolute", "b", "c", 0.4, ANGLE.replace("1.9", "1.8"))
+    + TOOL
+    + "</robot>"
+)
+HEAVY_C = '<mass value="1"/><inertia ixx="0.01"\nixy="0" ixz="0" iyy="0.01" iyz="0" izz="0.01"/>'
+INERTIA_C = HEAVY_C.partition("/>")[2]
+INERTIAL_B, INERTIAL_C = (
+    re.search(f'(?s)name="{name}">(<inertial>.*?</inertial>)', GOOD)[1]  # type: ignore[index]
+    for name in "bc"
+)
+SHAPE_C = '<collision><origin xyz="0 0 0.15"/><geometry><box size="0.1 0.1 0.21"/>'
+LOOP = '<loop_joint name="pin" type="revolute"><link1 link="a"/><link2 link="c"/></loop_joint>'
+
+BOTH = {"a", "base", "c"}
+
+# By kind: what is changed in the good file, how bad it is, and which names the finding has.
+FAULTS: dict[str, tuple[str, str, str, set[str]]] = {
+    "empty-range": (ANGLE, 'lower="0" upper="0"', "stops", {"j2"}),
+    "range-in-degrees": (ANGLE, 'lower="-170" upper="170"', "misleads", {"j2"}),
+    "range-in-millimetres": ('upper="0.5"', 'upper="500"', "misleads", {"j1"}),
+    "zero-velocity": (
+        f'{ANGLE} effort="50" velocity="3"',
+        f'{ANGLE} effort="50" velocity="0"',
+        "misleads",
+        {"j2"},
+    ),
+    "zero-effort": (f'{ANGLE} effort="50"', f'{ANGLE} effort="0"', "misleads", {"j2"}),
+    "mass-in-grams": (HEAVY_C, HEAVY_C.replace('"1"', '"1000"'), "misleads", {"j3"}),
+    "inertia-in-square-millimetres": (
+        INERTIA_C,
+        INERTIA_C.replace("0.01", "10000"),
+        "misleads",
+        {"j3"},
+    ),
+    "impossible-inertia": (
+        INERTIA_C,
+        INERTIA_C.replace('izz="0.01', 'izz="0.05'),
+        "misleads",
+        {"c"},
+    ),
+    "no-inertia": (INERTIAL_C, "", "stops", {"j3"}),
+    "no-inertial": (INERTIAL_B, "", "hint", {"b"}),
+    "mesh-unit": ("", "", "misleads", {"a"}),
+    "mesh": ("", "", "misleads", {"a"}),
+    "no-collision-shapes": ("", "", "hint", set()),
+    "tool-without-frame": (TOOL, "", "hint", {"c"}),
+    "always-touching": (SHAPE_C, SHAPE_C.replace("0.1 0.1 0.21", "3 3 3"), "hint", BOTH),
+    "mimic-ignored": ("</joint>\n<link", '<mimic joint="j2"/></joint>\n<link', "misleads", {"j3"}),
+    "no-joint": ("", "", "stops", set()),
+}
+
+
+def written(folder: Path, text: str, mesh_folder: str = "shapes") -> list[str]:
+    """The arguments of the command for a file with this text, after its mesh was written."""
+    (folder / "robot").mkdir()
+    (folder / mesh_folder).mkdir(parents=True)
+    (folder / mesh_folder / "a.off").write_text(CUBE)
+    file = folder / "robot" / "arm.urdf"
+    file.write_text(text)
+    return [str(file), "--package-dir", str(folder)]
+
+
+def checked(
+    capsys: pytest.CaptureFixture[str], *arguments: str
+) -> tuple[int, dict[str, dict[str, Any]]]:
+    """The exit code and the findings by kind."""
+    capsys.readouterr()
+    code = main(["doctor", *arguments, "--json"])
+    found = json.loads(capsys.readouterr().out)
+    assert found["stops"] == (code == 1)
+    return code, {each["kind"]: each for each in found["findings"]}
+
+
+def mended(arguments: list[str], finding: dict[str, Any]) -> list[str]:
+    """The arguments after every line of a finding was written where it says."""
+    file, more = Path(arguments[0]), list[str]()
+    tree = ElementTree.parse(file)
+    semantics = ""
+    for line in finding["lines"]:
+        if line["where"] == "command line":
+            more += line["text"].split()
+        elif line["where"] == "SRDF":
+            semantics += line["text"]
+        elif line["where"] != "Python":
+            root, new = tree.getroot(), ElementTree.fromstring(line["text"])
+            parent = root if line["where"] == "." else root.find(line["where"])
+            assert parent is not None
+            old = None if line["where"] == "." else parent.find(new.tag)
+            if old is not None:
+                parent.remove(old)
+            parent.append(new)
+    tree.write(file)
+    if semantics:
+        srdf = file.with_suffix(".srdf")
+        srdf.write_text(f'<robot name="arm">{semantics}</robot>')
+        more += ["--srdf", str(srdf)]
+    return [*arguments, *more]
+
+
+def faulty(folder: Path, kind: str) -> list[str]:
+    """The good arm with one fault."""
+    old, new, _, _ = FAULTS[kind]
+    assert old in GOOD
+    text = GOOD.replace(old, new, 1)
+    if kind == "no-collision-shapes":
+        text = re.sub("(?s)<collision>.*?</collision>", "", GOOD)
+    if kind == "no-joint":
+        text = re.sub("revolute|prismatic", "fixed", GOOD)
+    arguments = written(folder, text)
+    if kind == "mesh-unit":
+        mesh = folder / "shapes" / "a.off"
+        numbers = re.sub(r"(-?0\.\d)", lambda found: f"{1e3 * float(found[1]):g}", CUBE)
+        mesh.write_text(numbers)
+    return arguments[:1] if kind == "mesh" else arguments
+
+
+def test_a_good_robot_has_none(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = written(tmp_path, GOOD)
+    assert checked(capsys, *arguments) == (0, {})
+    assert main(["info", *arguments, "--check"]) == 0
+    assert "arm: nothing hurts. Goals may name the frame tool." in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("kind", FAULTS)
+def test_a_fault_is_found_and_its_line_mends_it(
+    kind: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    _, _, severity, names = FAULTS[kind]
+    arguments = faulty(tmp_path, kind)
+    code, found = checked(capsys, *arguments)
+    assert found[kind]["severity"] == severity
+    assert set(found[kind]["subject"]) == names
+    assert code == (severity == "stops")
+    assert len(found) == 1, found
+    assert main(["doctor", *arguments]) == code
+    assert found[kind]["sentence"] in capsys.readouterr().out
+    code, left = checked(capsys, *mended(arguments, found[kind]))
+    assert kind not in left
+    assert code == 0
+    assert set(left) <= {"always-touching"}  # of a whole robot in the air
+
+
+@pytest.mark.parametrize("factor", [1e6, 1e9])
+def test_inertias_are_as_they_were(
+    factor: float, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments = written(
+        tmp_path, GOOD.replace(INERTIA_C, INERTIA_C.replace("0.01", f"{factor / 100:g}"))
+    )
+    _, found = checked(capsys, *arguments)
+    mended(arguments, found["inertia-in-square-millimetres"])
+    meant, read = (pin.buildModelFromXML(x) for x in (GOOD, Path(arguments[0]).read_text()))
+    assert read.inertias[3].isApprox(meant.inertias[3], 1e-9)
+
+
+def test_a_light_wrist_gets_a_rotor(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    light = HEAVY_C.replace('"1"', '"1e-4"').replace("0.01", "1e-7")
+    arguments = written(tmp_path, GOOD.replace(HEAVY_C, light))
+    code, found = checked(capsys, *arguments)
+    assert code == 0
+    assert found.keys() == {"light-joint"}
+    assert found["light-joint"]["subject"] == ["j3"]
+    (line,) = found["light-joint"]["lines"]
+    rotors = eval(line["text"], {"hovi": hovi})
+    robot = hovi.load_robot(arguments[0])
+    q = np.array([0.2, 0.3, 1.0])
+    mass = np.diag(pin.crba(robot.model, robot.model.createData(), q))
+    shares = (mass + rotors.values(robot)) / mass[1]
+    assert mass[2] < 1e-4 * mass[1]
+    assert shares[2] > 2.5e-3
+
+
+def test_a_loop_is_closed_by_locked_joints(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments = written(tmp_path, GOOD.replace("</robot>", f"{LOOP}</robot>"))
+    code, found = checked(capsys, *arguments)
+    assert code == 0
+    assert found.keys() == {"open-loop"}
+    assert found["open-loop"]["severity"] == "misleads"
+    (line,) = found["open-loop"]["lines"]
+    assert line["text"] == "locked=['j2', 'j3']"
+    scene = tmp_path / "scene.toml"
+    scene.write_text(
+        f"""format = 2
+robot = "robot/arm.urdf"
+package_dirs = ["."]
+{line["text"]}
+duration = 1.0
+start.q = [0.1]
+goal.q = [0.2]
+"""
+    )
+    _, left = checked(capsys, str(scene))
+    assert "open-loop" not in left
+
+
+@pytest.mark.parametrize(
+    ("name", "kinds"),
+    [
+        ("ur5", set()),
+        ("panda", {"mimic-ignored"}),
+        ("solo12", {"always-touching"}),
+        ("talos", {"light-joint"}),
+        ("kinova", {"light-joint"}),
+    ],
+)
+def test_real_robots_have_few(
+    name: str, kinds: set[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    code, found = checked(capsys, name)
+    assert (code, found.keys()) == (0, kinds)
+
+
+def test_what_is_no_robot_gets_one_sentence(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments = written(tmp_path, GOOD.replace('lower="-2"', 'lower="4"'))
+    (tmp_path / "m.npz").write_bytes(b"")
+    for given in (arguments, [str(tmp_path / "none.urdf")], [str(tmp_path / "m.npz")]):
+        assert main(["doctor", *given]) == 2
+        told = capsys.readouterr()
+        assert told.out == ""
+        assert re.fullmatch("error: .*\n", told.err)
+    assert main(["info", arguments[0], "--json"]) == 2
