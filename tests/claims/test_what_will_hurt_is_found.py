@@ -166,6 +166,14 @@ def mended(arguments: list[str], finding: dict[str, Any]) -> list[str]:
     return [*arguments, *more]
 
 
+def scene_file(folder: Path, more: str, q: str) -> str:
+    """A scene of the arm with more lines."""
+    scene = folder / "scene.toml"
+    lines = "format = 2", 'robot = "robot/arm.urdf"', 'package_dirs = ["."]', "duration = 1.0"
+    scene.write_text("\n".join([*lines, f"start.q = {q}", f"goal.q = {q}", more]))
+    return str(scene)
+
+
 def faulty(folder: Path, kind: str) -> list[str]:
     """The good arm with one fault."""
     old, new, _, _ = FAULTS[kind]
@@ -237,6 +245,9 @@ def test_a_light_wrist_gets_a_rotor(tmp_path: Path, capsys: pytest.CaptureFixtur
     shares = (mass + rotors.values(robot)) / mass[1]
     assert mass[2] < 1e-4 * mass[1]
     assert shares[2] > 2.5e-3
+    effect = f"inertia = {{ {', '.join(f'{k} = {x}' for k, x in rotors.inertia.items())} }}"
+    scene = scene_file(tmp_path, f"[effects.armature]\n{effect}\n", "[0.1, 0.0, 0.0]")
+    assert checked(capsys, scene) == (0, {})
 
 
 def test_a_loop_is_closed_by_locked_joints(
@@ -249,18 +260,7 @@ def test_a_loop_is_closed_by_locked_joints(
     assert found["open-loop"]["severity"] == "misleads"
     (line,) = found["open-loop"]["lines"]
     assert line["text"] == "locked=['j2', 'j3']"
-    scene = tmp_path / "scene.toml"
-    scene.write_text(
-        f"""format = 2
-robot = "robot/arm.urdf"
-package_dirs = ["."]
-{line["text"]}
-duration = 1.0
-start.q = [0.1]
-goal.q = [0.2]
-"""
-    )
-    _, left = checked(capsys, str(scene))
+    _, left = checked(capsys, scene_file(tmp_path, line["text"], "[0.1]"))
     assert "open-loop" not in left
 
 

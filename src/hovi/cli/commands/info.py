@@ -19,6 +19,8 @@ from hovi.cli.arguments.robots import (
 )
 
 if TYPE_CHECKING:
+    import pinocchio as pin
+
     from hovi.robot.robot import Robot
 
 
@@ -90,17 +92,17 @@ def _scene(scene: str, check: bool, json: bool) -> None:
 
     task = load_task(find_scene(scene))
     if check:
-        _examine(task.scene.robot, json)
+        _examine(task.scene.robot, json, task.scene.model)
     print(describe_task(task))
 
 
-def _examine(robot: Robot, json: bool) -> NoReturn:
-    """Print what will hurt about a robot, and exit."""
+def _examine(robot: Robot, json: bool, model: pin.Model | None = None) -> NoReturn:
+    """Print what will hurt about a robot, and exit. model: with the rotors of a scene."""
     import json as json_text
 
     from hovi.cli.reports.findings import findings_json, findings_of, print_findings, stops
 
-    found = findings_of(robot)
+    found = findings_of(robot, model)
     if json:
         print(json_text.dumps(findings_json(robot, found)))
     else:

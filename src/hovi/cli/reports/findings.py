@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 from hovi.robot.findings.finding import SRDF, Finding, Line, Severity, element
 
 if TYPE_CHECKING:
+    import pinocchio as pin
+
     from hovi.robot.robot import Robot
 
 _HEADINGS = {
@@ -22,11 +24,11 @@ _SHOWN = 4
 _NAMED = re.compile(r"(\w+)\[@name=(['\"].*?['\"])\]")
 
 
-def findings_of(robot: Robot) -> tuple[Finding, ...]:
-    """What will hurt about a robot, the worst first."""
+def findings_of(robot: Robot, model: pin.Model | None = None) -> tuple[Finding, ...]:
+    """What will hurt about a robot, the worst first. model: its own unless a scene has rotors."""
     from hovi.robot.file_findings import file_findings, in_order
 
-    found = file_findings(robot.model, robot.source, robot.tip_frames)
+    found = file_findings(model or robot.model, robot.source, robot.tip_frames)
     has_shapes = all(each.kind not in ("mesh", "mesh-unit") for each in found)
     if has_shapes and not robot.unplanned_joints:
         found = in_order([*found, *_collisions(robot)])

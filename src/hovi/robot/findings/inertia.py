@@ -17,8 +17,10 @@ Array = npt.NDArray[np.float64]
 
 DENSITY = 1_000.0
 """Of a box around a shape, in [kg/m^3], of which an example of an inertia is made."""
+SHARE = 0.01
+"""Of the inertia of what moves with a link, from which an impossible inertia of it matters."""
 SMALL = 0.05
-"""The side of such a box of a link without shapes, in [m]."""
+"""The side at least of such a box of a link without shapes, in [m]."""
 MANY = 4
 """Number of light joints beyond which all joints get the same rotor."""
 _AT = {"ixx": (0, 0), "ixy": (0, 1), "ixz": (0, 2), "iyy": (1, 1), "iyz": (1, 2), "izz": (2, 2)}
@@ -29,14 +31,18 @@ def no_inertia(subject: Subject) -> Iterator[Finding]:
     if not subject.massless:
         return
     joints = tuple(str(subject.model.names[i]) for i in subject.massless)
-    links = [link for i in subject.massless for link in subject.bodies.get(i, ())[:1]]
-    lines = tuple(_inertial(subject, link) for link in links)
+    lines = tuple(
+        _inertial(subject, link, joint)
+        for joint in subject.massless
+        for link in subject.bodies.get(joint, ())[:1]
+    )
     yield Finding(
         Severity.STOPS,
         "no-inertia",
         joints,
         f"no inertia at {some_of(joints)}: there are no torques; give the links that they move a "
-        'mass and an inertia, or plan with objective = "acceleration"',
+        "mass and an inertia, as here those of boxes around their shapes at 1,000 kg/m^3, or plan "
+        'with objective = "acceleration"',
         lines or (Line(PYTHON, 'objective="acceleration"'),),
     )
 
@@ -44,11 +50,11 @@ def no_inertia(subject: Subject) -> Iterator[Finding]:
 def bare_links(subject: Subject) -> Iterator[Finding]:
     """Links that move without <inertial>: a hint where others fixed to them have no mass either."""
     found = {x.get("name", "") for x in subject.moving_links() if x.find("inertial") is None}
-    lumped, massless = list[str](), list[str]()
+    lumped, massless = dict[str, int](), dict[str, int]()
     for joint, links in subject.bodies.items():
         if joint not in subject.massless:
-            bare = [link for link in links if link in found]
-            (lumped if subject.model.inertias[joint].mass > 0.0 else massless).extend(bare)
+            bare = {link: joint for link in links if link in found}
+            (lumped if subject.model.inertias[joint].mass > 0.0 else massless).update(bare)
     for severity, names in ((Severity.HINT, massless), (Severity.NOTE, lumped)):
         if names:
             yield Finding(
@@ -56,25 +62,39 @@ def bare_links(subject: Subject) -> Iterator[Finding]:
                 "no-inertial",
                 tuple(names),
                 f"{some_of(names)}: moving without <inertial>, so without mass and inertia",
-                tuple(_inertial(subject, link) for link in names),
+                tuple(_inertial(subject, link, joint) for link, joint in names.items()),
             )
 
 
 def impossible(subject: Subject) -> Iterator[Finding]:
-    """Inertias that no body has: a principal one exceeds the sum of the others."""
+    """Inertias that no body has: a principal one exceeds the sum of the others.
+
+    A note where the rest of what moves with the link is far heavier, or nothing moves it.
+    """
     tensors = {name: tensor_of(link) for name, link in subject.links.items()}
-    odd = {name: x for name, x in tensors.items() if x is not None and _breaks_triangle(x)}
-    if odd:
-        yield Finding(
-            Severity.MISLEADS,
-            "impossible-inertia",
-            tuple(odd),
-            f"the principal inertias of {some_of(odd)} violate the triangle inequality",
-            tuple(
-                Line(f"link[@name={quoted(name)}]/inertial", inertia_text(_nearest_possible(x)))
-                for name, x in odd.items()
-            ),
-        )
+    excess = {name: _excess(x) for name, x in tensors.items() if x is not None}
+    odd = [name for name, much in excess.items() if much > 0.0]
+    matters = {name for name in odd if excess[name] > SHARE * _largest_around(subject, name)}
+    for severity, names in (
+        (Severity.MISLEADS, [name for name in odd if name in matters]),
+        (Severity.NOTE, [name for name in odd if name not in matters]),
+    ):
+        if names:
+            yield Finding(
+                severity,
+                "impossible-inertia",
+                tuple(names),
+                f"the principal inertias of {some_of(names)} violate the triangle inequality",
+                tuple(_possible(name, tensors[name]) for name in names),
+            )
+
+
+def _largest_around(subject: Subject, link: str) -> float:
+    """The largest inertia of the body that a link belongs to, in [kg m^2]; infinite if fixed."""
+    joint = next((i for i, links in subject.bodies.items() if link in links), 0)
+    if not joint:
+        return float("inf")
+    return float(np.linalg.eigvalsh(subject.model.inertias[joint].inertia)[-1])
 
 
 def light_joints(subject: Subject) -> Iterator[Finding]:
@@ -113,34 +133,43 @@ def inertia_text(tensor: Array) -> str:
     return element("inertia", {key: f"{tensor[at]:.6g}" for key, at in _AT.items()})
 
 
-def _breaks_triangle(tensor: Array) -> bool:
-    """Whether one principal inertia exceeds the sum of the two others by more than 1 %."""
+def _excess(tensor: Array) -> float:
+    """By how much a principal inertia exceeds the sum of the others, 0 within 1 %, in [kg m^2]."""
     low, middle, high = np.linalg.eigvalsh(tensor)
-    return bool(high > 1.01 * (low + middle) + 1e-9)
+    return float(high - low - middle) if high > 1.01 * (low + middle) + 1e-9 else 0.0
 
 
-def _nearest_possible(tensor: Array) -> Array:
+def _possible(link: str, tensor: Array | None) -> Line:
     """The inertia of the nearest distribution of mass P >= 0, with I = tr(P) 1 - P."""
-    values, axes = np.linalg.eigh(np.trace(tensor) / 2 * np.eye(3) - tensor)
+    given = np.zeros((3, 3)) if tensor is None else tensor
+    values, axes = np.linalg.eigh(np.trace(given) / 2 * np.eye(3) - given)
     spread = (axes * np.maximum(values, 0.0)) @ axes.T
-    return np.asarray(np.trace(spread) * np.eye(3) - spread)
+    possible = np.asarray(np.trace(spread) * np.eye(3) - spread)
+    return Line(f"link[@name={quoted(link)}]/inertial", inertia_text(possible))
 
 
-def _inertial(subject: Subject, link: str) -> Line:
-    """An example of a link's <inertial>: boxes around its shapes, of DENSITY."""
+def _inertial(subject: Subject, link: str, joint: int) -> Line:
+    """An example of a link's <inertial>: boxes around its shapes, of DENSITY.
+
+    joint: that moves it, whose body has the size of a link without shapes.
+    """
     boxes = [x for x in subject.boxes if x.link == link and len(x.corners)]
     kind = "collision" if any(x.kind == "collision" for x in boxes) else "visual"
-    mass, center, tensor = _solid([x for x in boxes if x.kind == kind])
+    side = max(subject.sizes[joint] / 2, SMALL)
+    mass, center, tensor = _solid([x for x in boxes if x.kind == kind], float(side))
     at = " ".join(f"{x:.4g}" for x in center)
     parts = element("origin", {"xyz": at}), element("mass", {"value": f"{mass:.4g}"})
     text = element("inertial", {}, *parts, inertia_text(tensor))
     return Line(f"link[@name={quoted(link)}]", text)
 
 
-def _solid(boxes: Iterable[ShapeBox]) -> tuple[float, Array, Array]:
-    """Mass, center (3,) and inertia (3, 3) about it of boxes along the axes of a link."""
+def _solid(boxes: Iterable[ShapeBox], side: float) -> tuple[float, Array, Array]:
+    """Mass, center (3,) and inertia (3, 3) about it of boxes along the axes of a link.
+
+    side: of a cube instead of boxes without volume, in [m].
+    """
     sides = [(x.corners.min(axis=0), x.corners.max(axis=0)) for x in boxes]
-    half = SMALL / 2 * np.ones(3)
+    half = side / 2 * np.ones(3)
     sides = [(low, high) for low, high in sides if np.prod(high - low) > 1e-9] or [(-half, half)]
     masses = np.array([DENSITY * np.prod(high - low) for low, high in sides])
     middles = np.array([(low + high) / 2 for low, high in sides])

@@ -16,23 +16,23 @@ SPEED, EFFORT = "3", "100"
 def limit_line(subject: Subject, joint: str, factor: float = 1.0) -> Line:
     """The element <limit>, or limits in Python for a model without a URDF.
 
-    What the file leaves empty, or at 0, has an example. factor: of the range of positions.
+    What the file leaves empty, or at 0, has an example. factor: of the range, 1 to keep it.
     """
-    lower, upper = (factor * bound for bound in subject.single.get(joint, (0.0, 0.0)))
-    if not lower < upper:
-        half = TURN if kind_of(subject.joints[joint]).units == (ANGLE,) else STROKE
-        lower, upper = -half, half
+    given = subject.single.get(joint, (0.0, 0.0))
+    half = TURN if kind_of(subject.joints[joint]).units == (ANGLE,) else STROKE
+    lower, upper = (f"{factor * x:.6g}" for x in (given if given[0] < given[1] else (-half, half)))
     joint_element = subject.elements.get(joint)
     if joint_element is None:
-        return Line(PYTHON, f'limits={{"q": {{{joint!r}: [{lower:.5g}, {upper:.5g}]}}}}')
+        return Line(PYTHON, f'limits={{"q": {{{joint!r}: [{lower}, {upper}]}}}}')
     limit = joint_element.find("limit")
     stated = {} if limit is None else limit.attrib
-    speed, effort = (
-        stated.get(key) if float(stated.get(key, "0")) else example
-        for key, example in (("velocity", SPEED), ("effort", EFFORT))
-    )
-    span = {"lower": f"{lower:.5g}", "upper": f"{upper:.5g}"}
-    if joint_element.get("type") not in ("revolute", "prismatic"):
-        span = {}
-    text = element("limit", {**span, "effort": str(effort), "velocity": str(speed)})
-    return Line(f"joint[@name={quoted(joint)}]", text)
+    examples = {"effort": EFFORT, "velocity": SPEED}
+    written = {
+        key: stated[key] if float(stated.get(key, "0")) else example
+        for key, example in examples.items()
+    }
+    if joint_element.get("type") in ("revolute", "prismatic"):
+        span = {"lower": lower, "upper": upper}
+        is_kept = given[0] < given[1] and factor == 1.0
+        written = {**({key: stated.get(key, "0") for key in span} if is_kept else span), **written}
+    return Line(f"joint[@name={quoted(joint)}]", element("limit", written))

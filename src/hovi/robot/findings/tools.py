@@ -20,7 +20,7 @@ def tools_without_frame(subject: Subject) -> Iterator[Finding]:
     found = {}
     for tip in subject.tips:
         joint, links = next((x for x in subject.bodies.items() if tip in x[1]), (0, []))
-        if links != [tip] or subject.model.joints[joint].nv != 1:
+        if links != [tip] or not joint or subject.model.joints[joint].nv != 1:
             continue
         corners = [box.corners for box in subject.boxes if box.link == tip and len(box.corners)]
         if corners and (end := _end_of(np.concatenate(corners)))[1] > LONG:
