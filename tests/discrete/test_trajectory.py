@@ -290,7 +290,7 @@ BROKEN: dict[str, tuple[Callable[[Entries], object], str]] = {
     "no scene": (edited("scene", None), "coordinates"),
     "a scene of another kind": (edited("scene", []), "SHA-256"),
     "another format": (edited("format", "something"), "not a hovi trajectory"),
-    "a later version": (edited("version", 2), "format version 2"),
+    "a later version": (edited("version", 3), "format version 3"),
     "no metadata": (lambda c: c["header"].pop("metadata"), "lacks 'metadata'"),
     "NaN in the metadata": (edited("metadata", {"cost": np.nan}), "NaN is not a finite number"),
     "a node that does not follow": (array("q", spoil(0.5)), "q at the end of interval"),

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-import io
 import json
 import tempfile
-import zipfile
 from functools import cache
 from pathlib import Path
 from random import Random
@@ -15,7 +13,7 @@ from typing import Any
 import hovi
 from hard import mutated_urdf
 from hard.mutated_bytes import mutated_bytes
-from hard.mutated_motion import TOKENS, UNUSUAL_VALUES, edit, packed, rehash, verdict
+from hard.mutated_motion import TOKENS, UNUSUAL_VALUES, edit, packed, rehash, unpacked, verdict
 from hard.verdict import Mutant
 from hovi.schemes import galerkin
 
@@ -41,9 +39,7 @@ def mutate(random: Random) -> Mutant:
     """A changed file: in its bytes, or in its tables `scenes` and `segments`."""
     if random.random() < 0.2:
         return Mutant(mutated_bytes(original(), random, TOKENS))
-    with zipfile.ZipFile(io.BytesIO(original())) as archive:
-        entries = {name.removesuffix(".npy"): archive.read(name) for name in archive.namelist()}
-    entries["header"] = entries["header"][entries["header"].index(b"\n") + 1 :]
+    entries = unpacked(original())
     change, reason = random.choice(_CHANGES)
     edit(entries, lambda header: change(header, random))
     rehash(entries, random)

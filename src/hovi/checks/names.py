@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
 from hovi.errors import InputError
 
 MAX_LENGTH = 1_000
@@ -18,3 +22,16 @@ def require_name(name: str, what: str) -> None:
             f"the name of {what} must be printable characters, at most {MAX_LENGTH:,}, got "
             f"{name[:80]!r}."
         )
+
+
+def as_names(values: Iterable[Any]) -> tuple[Any, ...]:
+    """Names as a tuple; a single string counts as one name. Raises InputError for others."""
+    if isinstance(values, str | Path):
+        return (values,)
+    try:
+        names = tuple(values)
+    except TypeError:  # no iterable
+        names = (None,)
+    if not all(isinstance(name, str | Path) for name in names):
+        raise InputError(f"expected a list of names, or a single one, got {values!r}.")
+    return names

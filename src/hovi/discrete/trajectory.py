@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import itertools
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import field
 from functools import cached_property
 from pathlib import Path
@@ -14,8 +14,9 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 import numpy.typing as npt
 
-from hovi.checks.arguments import check_arguments
+from hovi.checks.arguments import check_arguments_except
 from hovi.checks.shapes import numbers_of, require_shape
+from hovi.discrete import trajectory_file
 from hovi.discrete.grid import DiscretePath, Grid
 from hovi.discrete.interval_paths import scaled_data
 from hovi.discrete.node_continuity import require_continuous
@@ -24,18 +25,9 @@ from hovi.discrete.output.interpolant import interpolant_rows
 from hovi.discrete.output.path_sampler import PathSampler
 from hovi.discrete.output.trajectory_summary import TrajectorySummary
 from hovi.discrete.stored_torque import StoredTorque
-from hovi.discrete.trajectory_file import (
-    digest,
-    read_arrays,
-    require_known_name,
-    require_names,
-    require_unchanged,
-    schemes_of,
-    versions,
-    write_arrays,
-)
 from hovi.errors import HoviError, InputError, TrajectoryFileError
 from hovi.robot.robot import Robot
+from hovi.robot.source import absolute_folders
 from hovi.robot.space.chart import Chart
 from hovi.robot.space.configuration_space import ConfigurationSpace
 from hovi.scene.scene import Scene
@@ -65,7 +57,7 @@ class Sample(NamedTuple):
     tau: Array
 
 
-@check_arguments
+@check_arguments_except("package_dirs")
 @dataclass(frozen=True, eq=False, repr=False)
 class Trajectory(ExportMethods, TrajectorySummary):
     """A motion of a scene's robot on a grid, with its costates.
@@ -267,15 +259,17 @@ class Trajectory(ExportMethods, TrajectorySummary):
             return (self.space.integrate(path.q[k], x), *rates)[: order + 1]
         return Chart(self.space).jet(path.q[k], x, *rates)[: order + 1]
 
-    def save(self, path: str | os.PathLike[str] | io.BytesIO) -> None:
+    def save(self, path: str | os.PathLike[str] | io.BytesIO, *, meshes: bool = True) -> None:
         """Write the motion to one npz file, atomically and with reproducible bytes.
 
         The file contains the scene with the text of the URDF; for a robot given as a Pinocchio
         model it contains the torques instead.
-        path: the file, usually `*.npz`, or a stream. Raises TrajectoryFileError.
+        path: the file, usually `*.npz`, or a stream.
+        meshes: whether it contains the meshes of a robot that was loaded from a file, up to 20 MB.
+        Raises TrajectoryFileError.
         """
         for scheme, _ in self.grid.groups:
-            require_known_name(scheme)
+            trajectory_file.require_known_name(scheme)
         arrays = {
             "steps": self.grid.steps,
             "q": self.path.q,
@@ -286,7 +280,7 @@ class Trajectory(ExportMethods, TrajectorySummary):
         }
         if self.path.higher.size:
             arrays[_HIGHER] = self.path.higher
-        metadata = {"versions": dict(versions()), **self.metadata}
+        metadata = {"versions": dict(trajectory_file.versions()), **self.metadata}
         scene, segments = None, {}
         if self.robot is not None and self.robot.source.kind != "model":
             scene = None if self.scene is None else self.scene.to_dict()
@@ -300,28 +294,33 @@ class Trajectory(ExportMethods, TrajectorySummary):
             "schemes": [[name, len(list(run))] for name, run in itertools.groupby(self._names())],
             "metadata": metadata,
             "scene": scene,
-            "scene_sha256": digest(scene),
+            "scene_sha256": trajectory_file.digest(scene),
             **segments,
         }
-        write_arrays(path, header, arrays)
+        kept = trajectory_file.meshes_of(self._robots) if meshes else {}
+        trajectory_file.warn_of_hashes(kept)
+        trajectory_file.write_arrays(path, header, arrays, kept)
 
     @classmethod
-    def load(cls, path: str | os.PathLike[str]) -> Self:
+    def load(cls, path: str | os.PathLike[str], package_dirs: Iterable[str | Path] = ()) -> Self:
         """Read a file of `save`; everything in it is checked.
 
-        Raises TrajectoryFileError with one sentence about what is wrong with the file.
+        package_dirs: folders with the packages of meshes that are not in the file.
+        Raises TrajectoryFileError with one sentence about what is wrong with the file, ModelError
+        for a package folder with the files of every user.
         """
-        header, arrays = read_arrays(path, _ARRAYS, optional=[_TORQUE, _HIGHER])
+        header, arrays = trajectory_file.read_arrays(path, _ARRAYS, optional=[_TORQUE, _HIGHER])
+        files = absolute_folders(package_dirs), trajectory_file.read_meshes(path, header)
         try:
-            schemes = schemes_of(header["schemes"], arrays["inner"].shape)
+            schemes = trajectory_file.schemes_of(header["schemes"], arrays["inner"].shape)
             metadata = header["metadata"]
             if not isinstance(metadata, dict):
                 raise InputError("the metadata is not a table")
-            scene = _scene(header["scene"], header["scene_sha256"])
-            segments = SegmentScenes.from_tables(header) if "segments" in header else None
+            scene = trajectory_file.scene_of(header, *files)
+            segments = SegmentScenes.from_tables(header, *files) if "segments" in header else None
             stored = scene is None and segments is None
             if stored:
-                require_names(metadata["coordinates"], arrays["v"].shape)
+                trajectory_file.require_names(metadata["coordinates"], arrays["v"].shape)
             loaded = cls(
                 grid=Grid(arrays["steps"], schemes),
                 path=DiscretePath(*(arrays[name] for name in _PATH if name in arrays)),
@@ -332,7 +331,7 @@ class Trajectory(ExportMethods, TrajectorySummary):
                 segments=segments,
             )
             require_continuous(loaded.path, loaded.grid, loaded.space)
-            require_unchanged(header, arrays)
+            trajectory_file.require_unchanged(header, arrays)
             return loaded
         except KeyError as error:
             raise TrajectoryFileError(
@@ -342,6 +341,11 @@ class Trajectory(ExportMethods, TrajectorySummary):
             raise TrajectoryFileError(
                 f"trajectory file {Path(path).name!r} is inconsistent: {error}"
             ) from error
+
+    @property
+    def _robots(self) -> tuple[Robot, ...]:
+        scenes = (self.scene,) if self.segments is None else self.segments.scenes
+        return tuple({id(each.robot): each.robot for each in scenes if each is not None}.values())
 
     def _names(self) -> list[str]:
         return [scheme.name for scheme in self.grid.schemes]
@@ -390,11 +394,3 @@ def _check_shapes(trajectory: Trajectory) -> None:
 
 def _span(values: Array) -> str:
     return f"{values.min():g} to {values.max():g}" if values.size else "none"
-
-
-def _scene(description: Any, sha256: Any) -> Scene | None:
-    if description is None:
-        return None
-    if digest(description) != sha256:
-        raise InputError("its scene does not match the stored SHA-256")
-    return Scene.from_dict(description)

@@ -1,10 +1,11 @@
-"""The file format of trajectories: arrays of doubles and one JSON header in an npz file.
+"""The file format of trajectories: arrays of doubles, meshes and one JSON header in an npz file.
 
 The file is a plain npz that `numpy.load(path, allow_pickle=False)` reads. It is written without
 compression and with fixed time stamps, so that the same motion gives the same bytes on every
-machine. Files are untrusted input: sizes are checked before memory is allocated, and pickles are
-never decoded. The header holds the SHA-256 of the file's contents, which shows changes by accident
-or by hand; it is no signature.
+machine. A mesh is an entry of the bytes that `zlib.decompress` unpacks, under "mesh-" and the
+SHA-256 of its content; the header has the names in the URDF for it. Files are untrusted input:
+sizes are checked before memory is allocated, and pickles are never decoded. The header holds the
+SHA-256 of the file's contents, which shows changes by accident or by hand; it is no signature.
 """
 
 from __future__ import annotations
@@ -16,9 +17,9 @@ import json
 import math
 import os
 import zipfile
-from collections.abc import Iterable, Mapping
-from contextlib import AbstractContextManager, nullcontext
-from functools import cache
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import AbstractContextManager, contextmanager, nullcontext
+from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -27,13 +28,25 @@ import numpy.typing as npt
 
 from hovi.discrete.grid import MAX_INTERVALS
 from hovi.errors import HoviError, InputError, TrajectoryFileError, warn
+from hovi.robot.geometry import stored_meshes
+from hovi.robot.meshes.stored_meshes import (
+    MAX_KEPT_BYTES,
+    StoredMeshes,
+    from_table,
+    hashes_in,
+    to_table,
+)
+from hovi.robot.robot import Robot
+from hovi.scene.scene import Scene
 from hovi.schemes import Scheme, by_name
 from hovi.system.files import reason, require_file, whole_file
 
 Array = npt.NDArray[np.float64]
 
 FORMAT = "hovi-trajectory"
-VERSION = 1
+VERSION = 2
+_WITHOUT_MESHES = 1
+"""Version of files without meshes, which earlier versions of hovi read."""
 MAX_BYTES = 2**30
 MAX_HEADER_BYTES = 2**26
 MAX_HEADER_PARTS = 2_000_000
@@ -41,7 +54,9 @@ MAX_HEADER_PARTS = 2_000_000
 MAX_EXPANSION = 50
 """Maximum ratio of unpacked to packed size; real data compresses less."""
 _MARGIN = 2**16  # overhead of zip and npy
+_ARRAY_HEADER = 128  # bytes before those of a mesh
 _HEADER = "header"
+_MESHES, _MESH = "meshes", "mesh-"
 _ZIP = b"PK"
 """What every zip file, and so every npz, begins with."""
 _HASH = "sha256"
@@ -50,15 +65,21 @@ _BYTES = np.dtype("u1")
 
 
 def write_arrays(
-    path: str | os.PathLike[str] | BinaryIO, header: Mapping[str, Any], arrays: Mapping[str, Array]
+    path: str | os.PathLike[str] | BinaryIO,
+    header: Mapping[str, Any],
+    arrays: Mapping[str, Array],
+    meshes: Mapping[str, StoredMeshes] | None = None,
 ) -> None:
     """Write a header and named arrays to one npz, atomically and with reproducible bytes.
 
     path: the file; an existing one is replaced. Or a stream, which gets the bytes.
     header: JSON-compatible data.
     arrays: finite doubles of any shape, by name.
+    meshes: of robots by the sha256 of their URDFs.
     Raises TrajectoryFileError.
     """
+    packed = {key: file for each in (meshes or {}).values() for key, file in each.packed.items()}
+    header = {**header, _MESHES: to_table(meshes)} if meshes else header
     doubles = {name: np.ascontiguousarray(array, _DOUBLES) for name, array in arrays.items()}
     entries: dict[str, npt.NDArray[Any]] = {_HEADER: _encode_header(header, doubles)}
     if entries[_HEADER].nbytes > MAX_HEADER_BYTES:
@@ -67,6 +88,7 @@ def write_arrays(
             f"can have at most {MAX_HEADER_BYTES}."
         )
     entries |= doubles
+    entries |= {f"{_MESH}{key}": np.frombuffer(file, _BYTES) for key, file in packed.items()}
     size = sum(entry.nbytes for entry in entries.values())
     if size > MAX_BYTES:
         raise TrajectoryFileError(
@@ -97,7 +119,51 @@ def read_arrays(
     Returns the header and the arrays, finite doubles of any shape.
     Raises TrajectoryFileError with one sentence about what is wrong with the file.
     """
-    label = f"trajectory file {Path(path).name!r}"
+    label = _label(path)
+    with _opened(path, label) as archive:
+        members = {info.filename: info for info in archive.infolist()}
+        entry_names = [_HEADER, *names]
+        entry_names += [name for name in optional if f"{name}.npy" in members]
+        _check_members(members, entry_names, label)
+        _check_expansion(members, entry_names, Path(path).stat().st_size, label)
+        raw = {name: archive.read(members[f"{name}.npy"]) for name in entry_names}
+    header = _decode_header(_decode_array(raw.pop(_HEADER), _BYTES, f"{label}, header"), label)
+    return header, {name: _decode_doubles(raw[name], f"{label}, {name!r}") for name in raw}
+
+
+def read_meshes(path: str | os.PathLike[str], header: Mapping[str, Any]) -> dict[str, StoredMeshes]:
+    """The meshes of robots in a trajectory file, by the sha256 of their URDFs.
+
+    header: the result of `read_arrays`. Raises TrajectoryFileError.
+    """
+    if _MESHES not in header:
+        return {}
+    label = _label(path)
+    try:
+        names = [f"{_MESH}{each}" for each in hashes_in(header[_MESHES])]
+        with _opened(path, label) as archive:
+            members = {info.filename: info for info in archive.infolist()}
+            _check_members(members, [_HEADER, *names], label)
+            size = sum(members[f"{name}.npy"].file_size for name in names)
+            if size > MAX_KEPT_BYTES + len(names) * _ARRAY_HEADER:
+                raise InputError(f"its meshes take {size} bytes, more than {MAX_KEPT_BYTES}")
+            raw = {name: archive.read(members[f"{name}.npy"]) for name in names}
+        packed = {
+            name.removeprefix(_MESH): _decode_array(raw[name], _BYTES, f"{label}, {name!r}")
+            for name in names
+        }
+        return from_table(header[_MESHES], {key: each.tobytes() for key, each in packed.items()})
+    except InputError as error:
+        raise TrajectoryFileError(f"{label} is inconsistent: {error}.") from error
+
+
+def _label(path: str | os.PathLike[str]) -> str:
+    return f"trajectory file {Path(path).name!r}"
+
+
+@contextmanager
+def _opened(path: str | os.PathLike[str], label: str) -> Iterator[zipfile.ZipFile]:
+    """The archive, whose errors in the block become TrajectoryFileErrors of one sentence."""
     try:
         require_file(path, MAX_BYTES + _MARGIN)
         if _first_bytes(path) != _ZIP:
@@ -105,15 +171,10 @@ def read_arrays(
                 f"{label} is not a motion: expected an .npz file, as `hovi plan --out` writes it."
             )
         with zipfile.ZipFile(path) as archive:
-            members = {info.filename: info for info in archive.infolist()}
-            if len(members) < len(archive.infolist()):
+            if len({info.filename for info in archive.infolist()}) < len(archive.infolist()):
                 raise ValueError("an entry occurs twice")
-            entry_names = [_HEADER, *names]
-            entry_names += [name for name in optional if f"{name}.npy" in members]
-            _check_members(members, entry_names, label)
-            _check_expansion(members, entry_names, Path(path).stat().st_size, label)
-            raw = {name: archive.read(members[f"{name}.npy"]) for name in entry_names}
-    except TrajectoryFileError:
+            yield archive
+    except HoviError:
         raise
     except FileNotFoundError as error:
         raise TrajectoryFileError(f"there is no {label}.") from error
@@ -123,8 +184,6 @@ def read_arrays(
         raise TrajectoryFileError(f"{label} is not a complete npz file: {error}.") from error
     except Exception as error:  # such as zlib.error: each compression has its own
         raise TrajectoryFileError(f"{label} is damaged: {error}.") from error
-    header = _decode_header(_decode_array(raw.pop(_HEADER), _BYTES, f"{label}, header"), label)
-    return header, {name: _decode_doubles(raw[name], f"{label}, {name!r}") for name in raw}
 
 
 def _first_bytes(path: str | os.PathLike[str]) -> bytes:
@@ -174,6 +233,37 @@ def schemes_of(runs: Any, inner: tuple[int, ...]) -> tuple[Scheme, ...]:
     return tuple(schemes)
 
 
+def scene_of(
+    header: Mapping[str, Any],
+    package_dirs: Iterable[str | Path],
+    meshes: Mapping[str, StoredMeshes],
+) -> Scene | None:
+    """The scene in a header; None without one. Raises InputError for another than was written."""
+    description = header["scene"]
+    if description is None:
+        return None
+    if digest(description) != header["scene_sha256"]:
+        raise InputError("its scene does not match the stored SHA-256")
+    return Scene.from_dict(description, package_dirs, meshes)
+
+
+@lru_cache(maxsize=4)
+def meshes_of(robots: tuple[Robot, ...]) -> dict[str, StoredMeshes]:
+    """The meshes that the file of a motion keeps, by the sha256 of their URDFs."""
+    return stored_meshes(robot.source for robot in robots)
+
+
+def warn_of_hashes(meshes: Mapping[str, StoredMeshes]) -> None:
+    """Warn of meshes that a motion does not keep, since they are too large."""
+    left = {name for each in meshes.values() for name in each.meshes if not each.keeps(name)}
+    if left:
+        warn(
+            f"{len(left)} of the robot's meshes take more than {MAX_KEPT_BYTES / 1e6:.0f} MB, so "
+            "that the motion keeps their names and hashes alone: to show it elsewhere, name the "
+            "folder of their package in package_dirs or --package-dir."
+        )
+
+
 def require_names(names: Any, shape: tuple[int, ...]) -> None:
     """Raise InputError unless there is a name for each of the velocities, shape (N + 1, nv)."""
     if not isinstance(names, list) or len(names) != shape[-1]:
@@ -217,7 +307,8 @@ def _check_expansion(
 
 
 def _encode_header(header: Mapping[str, Any], arrays: Mapping[str, Array]) -> npt.NDArray[np.uint8]:
-    marked = {"format": FORMAT, "version": VERSION, **header}
+    version = VERSION if _MESHES in header else _WITHOUT_MESHES
+    marked = {"format": FORMAT, "version": version, **header}
     try:
         decoded = json.loads(json.dumps(marked, allow_nan=False))  # keys become strings
         decoded[_HASH] = _digest(decoded, arrays)
@@ -239,10 +330,10 @@ def _decode_header(data: npt.NDArray[Any], label: str) -> dict[str, Any]:
         raise TrajectoryFileError(f"{label} has a header that is not JSON: {error}.") from error
     if not isinstance(header, dict) or header.get("format") != FORMAT:
         raise TrajectoryFileError(f"{label} is not a hovi trajectory.")
-    if header.get("version") != VERSION:
+    if header.get("version") not in (_WITHOUT_MESHES, VERSION):
         raise TrajectoryFileError(
             f"{label} has format version {header.get('version')!r}, but this version of hovi reads "
-            f"version {VERSION}."
+            f"versions up to {VERSION}."
         )
     return header
 

@@ -6,11 +6,15 @@ stored in motion files. A CasadiCost holds a function, and is not among them.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, MutableMapping
-from typing import TypeVar
+import dataclasses
+from collections.abc import Iterable, Iterator, Mapping, MutableMapping
+from dataclasses import MISSING
+from typing import Any, TypeVar
+
+import numpy as np
 
 from hovi.effects.effect import Effect
-from hovi.errors import SceneError
+from hovi.errors import SceneError, nearest
 
 EFFECTS = {
     "gravity": "Gravity",
@@ -86,3 +90,39 @@ def register(effect: Kind) -> Kind:
             f"for {effect.__name__}."
         )
     return effect
+
+
+def effect_of_table(key: str, values: object, name: str = "effects") -> Effect:
+    """An effect from its key and its fields as a file has them. name: of the table of effects.
+
+    Raises SceneError.
+    """
+    if key not in REGISTRY:
+        raise SceneError(f"there is no effect {key!r}; {nearest(str(key), REGISTRY)}")
+    known = {each.name for each in dataclasses.fields(REGISTRY[key]) if each.init}
+    if not isinstance(values, Mapping):
+        raise SceneError(f"effect {key!r} takes {', '.join(sorted(known))}, not {values!r}.")
+    for given in values:
+        if given not in known:
+            hint = nearest(str(given), known)
+            raise SceneError(f"unknown key `{name}.{key}.{given}`; {hint}")
+    for each in dataclasses.fields(REGISTRY[key]):
+        needed = each.default is MISSING and each.default_factory is MISSING
+        if needed and each.name not in values:
+            raise SceneError(f"`{name}.{key}.{each.name}` is missing.")
+    return REGISTRY[key](**values)
+
+
+def as_effects(given: object, name: str = "effects") -> tuple[Effect, ...]:
+    """Effects as a tuple. name: of their table in messages.
+
+    Raises SceneError for anything but a list or a table of effects.
+    """
+    effects: tuple[Any, ...] = (None,)
+    if isinstance(given, Mapping):
+        effects = tuple(effect_of_table(key, values, name) for key, values in given.items())
+    elif isinstance(given, Iterable) and not isinstance(given, str | np.ndarray):
+        effects = tuple(given)
+    if not all(isinstance(each, Effect) for each in effects):
+        raise SceneError(f"effects is a list such as [hovi.effects.Gravity()], not {given!r}.")
+    return effects

@@ -3,7 +3,7 @@
 Mesh names are untrusted input: each file must lie inside its own package folder (or, for plain
 paths, inside the URDF's folder, the ROS package around it, or one of `package_dirs`), and so must
 every file that a mesh names. A shape whose mesh is missing or lies outside is left out and the
-reason is recorded; the robot stays usable.
+reason is recorded; the robot stays usable. Meshes that came with a motion are taken from there.
 """
 
 from __future__ import annotations
@@ -11,7 +11,8 @@ from __future__ import annotations
 import os
 import xml.etree.ElementTree as ElementTree
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
 from pathlib import Path
 
 import coal
@@ -23,10 +24,11 @@ from hovi.errors import ModelError
 from hovi.robot.example_robots import example_robot
 from hovi.robot.formats.packages import holds_all_files, package_name
 from hovi.robot.meshes.mesh_shape import mesh_shape
+from hovi.robot.meshes.stored_meshes import Packing, StoredMesh, StoredMeshes, content_hash
 from hovi.robot.model import build_full_model, couplings_in, locked_and_coupled
 from hovi.robot.source import RobotSource
 from hovi.robot.urdf.check import checked_urdf
-from hovi.robot.urdf.mesh_files import check_mesh, is_inside
+from hovi.robot.urdf.mesh_files import check_mesh, check_stored, is_inside, shown_textures
 from hovi.robot.urdf.normalize import make_plain
 from hovi.system.dataclass import dataclass
 from hovi.system.files import reason
@@ -89,9 +91,26 @@ def find_mesh(filename: str, source: RobotSource, drawn: bool = False) -> tuple[
     """The file of a mesh, and its content.
 
     drawn: whether its textures are needed, too.
-    Raises ModelError if it does not exist, cannot be used, or if it or a file that it names is
-    outside its folder.
+    Raises ModelError if it does not exist, cannot be used, if it or a file that it names is outside
+    its folder, or if it is not the file with which the motion was saved.
     """
+    stored = source.meshes
+    if stored.keeps(filename):
+        mesh, path = stored.meshes[filename], Path(stored.paths[filename])
+        content = stored.content(mesh.sha256)
+        check_stored(path, content, mesh.textures, drawn)
+        return path, content
+    path, content = _find_file(filename, source, drawn)
+    if filename in stored.meshes and stored.meshes[filename].sha256 != content_hash(content):
+        raise ModelError(
+            f"mesh {_short(filename)} in {str(path.parent)!r} is another file than the one of the "
+            "motion: name the folder of that one in package_dirs, or load the robot and plan again."
+        )
+    return path, content
+
+
+def _find_file(filename: str, source: RobotSource, drawn: bool) -> tuple[Path, bytes]:
+    """The same for a mesh that did not come with a motion."""
     try:
         candidates = list(_candidates(filename, source))
         for root, path in candidates:
@@ -110,7 +129,46 @@ def find_mesh(filename: str, source: RobotSource, drawn: bool = False) -> tuple[
     except (OSError, RuntimeError, ValueError) as error:  # too long, a loop of links, a NUL
         why = reason(error) if isinstance(error, OSError) else "no file can have that path"
         raise ModelError(f"mesh {_short(filename)} cannot be looked for: {why}.") from error
-    raise ModelError(f"mesh {_short(filename)} was not found in {_places(candidates)}.")
+    kept = "" if filename not in source.meshes.meshes else " is too large for its motion's file and"
+    raise ModelError(f"mesh {_short(filename)}{kept} was not found in {_places(candidates)}.")
+
+
+def stored_meshes(sources: Iterable[RobotSource]) -> dict[str, StoredMeshes]:
+    """The meshes of robots for the file of their motion, by the sha256 of their URDFs.
+
+    Of each robot all visual ones with their textures are kept, then all collision ones, as far as
+    there is room; of the others, names and hashes. Robots that are found by a name have none.
+    """
+    packing = Packing()
+    tables = {
+        source.sha256 or "": _stored(source, packing) for source in sources if source.kind == "urdf"
+    }
+    return {urdf: StoredMeshes(each, packing.packed) for urdf, each in tables.items() if each}
+
+
+def _stored(source: RobotSource, packing: Packing) -> dict[str, StoredMesh]:
+    """The meshes of a robot that can be used, by name. packing: gets their contents."""
+    robot, found = checked_urdf(source.urdf or "", source.reference), dict[str, StoredMesh]()
+    for kind in ("visual", "collision"):
+        meshes = robot.iterfind(f"link/{kind}/geometry/mesh")
+        for name in dict.fromkeys(mesh.get("filename", "") for mesh in meshes):
+            with suppress(ModelError, OSError):
+                if name not in found:
+                    content, textures = _contents(name, source, kind == "visual")
+                    hashes = {each: packing.add(texture) for each, texture in textures.items()}
+                    found[name] = StoredMesh(packing.add(content), hashes)
+        packing.keep()
+    return {**source.meshes.meshes, **found}
+
+
+def _contents(name: str, source: RobotSource, drawn: bool) -> tuple[bytes, dict[str, bytes]]:
+    """A mesh, and the textures that a page shows by their names in it. Raises ModelError."""
+    path, content = find_mesh(name, source, drawn)
+    textures = shown_textures(path, content) if drawn else []
+    if source.meshes.keeps(name):
+        hashes = source.meshes.meshes[name].textures
+        return content, {each: source.meshes.content(hashes[each]) for each in textures}
+    return content, {each: (path.parent / each).read_bytes() for each in textures}
 
 
 def _candidates(filename: str, source: RobotSource) -> Iterator[tuple[Path, Path]]:
@@ -248,5 +306,5 @@ def _short(filename: str) -> str:
 
 def _places(candidates: list[tuple[Path, Path]]) -> str:
     if not candidates:
-        return "any package folder; give package_dirs=[the folder that holds the package]"
+        return "any package folder; give package_dirs=[the folder of the package] or --package-dir"
     return ", ".join(repr(str(root)) for root, _ in candidates)

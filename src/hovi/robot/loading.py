@@ -11,6 +11,7 @@ import pinocchio as pin
 
 from hovi.checks.arguments import check_arguments_except
 from hovi.checks.kinds import is_number
+from hovi.checks.names import as_names
 from hovi.errors import InputError, ModelError, expect, warn
 from hovi.robot.example_robots import BUILT_IN_CODE, build_in_code, example_robot, rotor_armature
 from hovi.robot.findings.loops import open_loops
@@ -22,7 +23,7 @@ from hovi.robot.mimic_model import Coupling
 from hovi.robot.mimic_tags import held_values, read_couplings
 from hovi.robot.model import build_full_model, build_model, locked_model
 from hovi.robot.robot import Robot
-from hovi.robot.source import MAX_POSITION, RobotSource, text_hash
+from hovi.robot.source import MAX_POSITION, RobotSource, absolute_folders, text_hash
 from hovi.robot.srdf import read_srdf_file
 from hovi.robot.urdf.check import MAX_DOF, checked_urdf, read_urdf
 from hovi.robot.urdf.closed_loops import closed_loops
@@ -35,19 +36,6 @@ def is_path(text: str) -> bool:
     """Whether a string is a file path rather than the name of an example."""
     suffixes = (".urdf", ".xml", ".xacro", ".mjcf", ".sdf")
     return text.lower().endswith(suffixes) or "/" in text or "\\" in text
-
-
-def as_names(values: Iterable[Any]) -> tuple[Any, ...]:
-    """Names as a tuple; a single string counts as one name. Raises InputError for others."""
-    if isinstance(values, str | Path):
-        return (values,)
-    try:
-        names = tuple(values)
-    except TypeError:  # no iterable
-        names = (None,)
-    if not all(isinstance(name, str | Path) for name in names):
-        raise InputError(f"expected a list of names, or a single one, got {values!r}.")
-    return names
 
 
 def file_source(
@@ -184,7 +172,7 @@ def load_robot(
     expect(mimic, bool, "mimic=True or mimic=False")
     expect(False if free_flyer is None else free_flyer, bool, "free_flyer=True or free_flyer=False")
     held = _checked(locked)
-    folders = tuple(str(Path(folder).absolute()) for folder in as_names(package_dirs))
+    folders = absolute_folders(package_dirs)
     semantics = None if srdf is None else Path(srdf)
     if isinstance(x, pin.Model):
         return _from_model(x, x.name, held, (visual, collision), semantics)

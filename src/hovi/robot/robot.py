@@ -18,13 +18,14 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from hovi.checks.arguments import check_arguments, check_arguments_except
+from hovi.checks.arguments import check_arguments_except
 from hovi.checks.shapes import require_rows
 from hovi.errors import InputError, ModelError, nearest
 from hovi.robot import model as robot_model
 from hovi.robot.description import describe
 from hovi.robot.geometry import Shapes, load_shapes
 from hovi.robot.mass_matrix import check_mass_matrix
+from hovi.robot.meshes.stored_meshes import StoredMeshes
 from hovi.robot.mimic_model import Coupling, PortableModel, couplings_of
 from hovi.robot.source import RobotSource
 from hovi.robot.space import pinocchio_configurations as configuration
@@ -38,7 +39,7 @@ from hovi.system.dataclass import dataclass
 Array = npt.NDArray[np.float64]
 
 
-@check_arguments
+@check_arguments_except("package_dirs")
 @dataclass(frozen=True, eq=False)
 class Robot(Coordinates):
     """A robot, created by `load_robot`.
@@ -245,9 +246,8 @@ class Robot(Coordinates):
         """The SRDF's configuration `name`, (nq,). Raises InputError for an unknown name."""
         if name in self.poses:
             return self.poses[name].copy()
-        known = (
-            nearest(name, self.poses) if self.poses else "its SRDF, if it has one, defines none."
-        )
+        none = "its SRDF, if it has one, defines none."
+        known = nearest(name, self.poses) if self.poses else none
         raise InputError(f"robot {self.name!r} has no pose {name!r}: {known}")
 
     # Shapes
@@ -293,26 +293,20 @@ class Robot(Coordinates):
 
         Raises InputError for other shapes.
         """
-        if self.vector_joints:
-            require_rows((("q", q, self.nq), ("dq", dq, self.nv)))
-            return np.asarray(q + dq)
-        if self.unplanned_joints:
-            require_rows((("q", q, self.nq), ("dq", dq, self.nv)))
-            return configuration.integrate(self.model, q, dq)
-        return self.space.integrate(q, dq)
+        if not (self.vector_joints or self.unplanned_joints):
+            return self.space.integrate(q, dq)
+        require_rows((("q", q, self.nq), ("dq", dq, self.nv)))
+        return q + dq if self.vector_joints else configuration.integrate(self.model, q, dq)
 
     def difference(self, q0: Array, q1: Array) -> Array:
         """q1 (-) q0: the tangent vector (..., nv) that moves q0 (..., nq) to q1 (..., nq).
 
         Raises InputError for other shapes.
         """
-        if self.vector_joints:
-            require_rows((("q0", q0, self.nq), ("q1", q1, self.nq)))
-            return np.asarray(q1 - q0)
-        if self.unplanned_joints:
-            require_rows((("q0", q0, self.nq), ("q1", q1, self.nq)))
-            return configuration.difference(self.model, q0, q1)
-        return self.space.difference(q0, q1)
+        if not (self.vector_joints or self.unplanned_joints):
+            return self.space.difference(q0, q1)
+        require_rows((("q0", q0, self.nq), ("q1", q1, self.nq)))
+        return q1 - q0 if self.vector_joints else configuration.difference(self.model, q0, q1)
 
     def frame_position(self, frame: str, q: Array) -> Array:
         """Position of a frame's origin in the world, in [m]: q (..., nq) -> (..., 3).
@@ -379,15 +373,21 @@ class Robot(Coordinates):
         return {"name": self.name, **self.source.to_dict()}
 
     @classmethod
-    def from_dict(cls, data: Mapping[str, Any], package_dirs: Iterable[str | Path] = ()) -> Robot:
+    def from_dict(
+        cls,
+        data: Mapping[str, Any],
+        package_dirs: Iterable[str | Path] = (),
+        meshes: Mapping[str, StoredMeshes] | None = None,
+    ) -> Robot:
         """The robot from the result of `to_dict`, built from the text of its URDF.
 
-        package_dirs: local folders that contain the packages of its meshes.
+        package_dirs: local folders that contain the packages of its meshes. meshes: those that
+            came with a motion, by the sha256 of the URDF; they are taken first.
         Raises ModelError, also for a robot that was loaded from a pinocchio.Model.
         """
         if not isinstance(data, Mapping) or not isinstance(data.get("name"), str):
             raise ModelError("a stored robot needs a string under 'name'.")
-        source = RobotSource.from_dict(data, tuple(str(folder) for folder in package_dirs))
+        source = RobotSource.from_dict(data, package_dirs, meshes)
         return cls(data["name"], robot_model.build_model(source), source)
 
     def __getstate__(self) -> dict[str, Any]:

@@ -4,17 +4,21 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import field
+from pathlib import Path
 from typing import Any, Literal, get_args
 
+from hovi.checks.names import as_names
 from hovi.errors import ModelError
 from hovi.robot.formats.packages import holds_all_files
+from hovi.robot.meshes.stored_meshes import StoredMeshes
 from hovi.system.dataclass import dataclass
 
 SourceKind = Literal["urdf", "example", "model"]
 MAX_POSITION = 1e9
 """Largest position of a locked joint, in [rad] or [m]."""
+_NO_MESHES = StoredMeshes()
 
 
 @dataclass(frozen=True)
@@ -35,6 +39,7 @@ class RobotSource:
     srdf: the text of the SRDF, or None.
     mimic: whether joints with a <mimic> tag follow their leaders.
     notes: what the file of a model says and the model does not have, for `hovi info`.
+    meshes: those that the file of a motion brought, which are taken before any of a folder.
     Raises ModelError for such a folder.
     """
 
@@ -51,14 +56,10 @@ class RobotSource:
     srdf: str | None = field(default=None, repr=False)
     mimic: bool = False
     notes: tuple[str, ...] = ()
+    meshes: StoredMeshes = field(default=_NO_MESHES, compare=False, repr=False)
 
     def __post_init__(self) -> None:
-        for folder in self.package_dirs:
-            if holds_all_files(folder):
-                raise ModelError(
-                    f"package_dirs names {folder!r}, which holds the files of every user, so that "
-                    "meshes could be read from anywhere: name the folder of the packages."
-                )
+        _check_folders(self.package_dirs)
 
     @property
     def held(self) -> dict[str, float]:
@@ -81,8 +82,16 @@ class RobotSource:
         }
 
     @classmethod
-    def from_dict(cls, data: Mapping[str, Any], package_dirs: tuple[str, ...] = ()) -> RobotSource:
-        """The source from the result of `to_dict`. Raises ModelError if it is incomplete."""
+    def from_dict(
+        cls,
+        data: Mapping[str, Any],
+        package_dirs: Iterable[str | Path] = (),
+        meshes: Mapping[str, StoredMeshes] | None = None,
+    ) -> RobotSource:
+        """The source from the result of `to_dict`. Raises ModelError if it is incomplete.
+
+        meshes: of robots, by the sha256 of their URDFs.
+        """
         kind = _entry(data, "kind", str)
         if kind not in get_args(SourceKind):
             raise ModelError(
@@ -100,14 +109,34 @@ class RobotSource:
             reference=_entry(data, "reference", str),
             urdf=urdf,
             sha256=sha256,
-            package_dirs=package_dirs,
+            package_dirs=absolute_folders(package_dirs),
             locked=locked,
             locked_at=_positions(data.get("locked_at", []), len(locked)),
             free_flyer=_entry(data, "free_flyer", bool),
             armature=_armature(_entry(data, "armature", dict)),
             srdf=None if data.get("srdf") is None else _entry(data, "srdf", str),
             mimic="mimic" in data and _entry(data, "mimic", bool),
+            meshes=(meshes or {}).get(sha256 or "", _NO_MESHES),
         )
+
+
+def absolute_folders(folders: Iterable[str | Path]) -> tuple[str, ...]:
+    """The paths of package_dirs, or of a single one, from the root.
+
+    Raises InputError for others than paths, ModelError for a folder of everybody's files.
+    """
+    paths = tuple(str(Path(folder).absolute()) for folder in as_names(folders))
+    _check_folders(paths)
+    return paths
+
+
+def _check_folders(package_dirs: tuple[str, ...]) -> None:
+    for folder in package_dirs:
+        if holds_all_files(folder):
+            raise ModelError(
+                f"package_dirs names {folder!r}, which holds the files of every user, so that "
+                "meshes could be read from anywhere: name the folder of the packages."
+            )
 
 
 def text_hash(text: str) -> str:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import MISSING, field
+from dataclasses import field
 from functools import cached_property, lru_cache
+from pathlib import Path
 from typing import Any
 
 import casadi as ca
@@ -19,9 +20,10 @@ from hovi.dynamics.mimic_kernel import rnea_kernel, without_rnea_kernel
 from hovi.dynamics.moving_base_torque import MovingBaseTorque, inverse_dynamics, on_base_joints
 from hovi.dynamics.torque_model import AnalyticTorque, CasadiTorque, SummedTorque, TorqueModel
 from hovi.effects.effect import Effect
-from hovi.effects.registration import REGISTRY
-from hovi.errors import ModelError, SceneError, nearest
+from hovi.effects.registration import REGISTRY, as_effects, effect_of_table
+from hovi.errors import ModelError, SceneError
 from hovi.robot.mass_matrix import check_mass_matrix, joints_without_inertia, named_joints
+from hovi.robot.meshes.stored_meshes import StoredMeshes
 from hovi.robot.mimic_model import PortableModel, check_coupling
 from hovi.robot.robot import Robot
 from hovi.scene.cost_terms import PotentialTerm, RunningCostTerm
@@ -35,7 +37,7 @@ from hovi.system.dataclass import dataclass
 Array = npt.NDArray[np.float64]
 
 
-@check_arguments_except("effects", "passive")
+@check_arguments_except("effects", "passive", "package_dirs")
 @dataclass(frozen=True, eq=False)
 class Scene:
     """A robot with the effects that act on it; nothing else is simulated.
@@ -231,18 +233,23 @@ class Scene:
         return {"robot": self.robot.to_dict(), "effects": effects, **passive}
 
     @classmethod
-    def from_dict(cls, data: dict[str, Any]) -> Scene:
+    def from_dict(
+        cls,
+        data: dict[str, Any],
+        package_dirs: Iterable[str | Path] = (),
+        meshes: Mapping[str, StoredMeshes] | None = None,
+    ) -> Scene:
         """The scene from the result of `to_dict`.
 
+        package_dirs, meshes: see `Robot.from_dict`.
         Raises SceneError for an unknown effect, ModelError for a robot that cannot be read.
         """
         tables = data.get("effects"), data.get("robot")
         if not all(isinstance(table, dict) for table in tables):
             raise SceneError("a stored scene needs the tables 'robot' and 'effects'.")
-        effects = [_effect(key, values) for key, values in data["effects"].items()]
-        return cls(
-            Robot.from_dict(data["robot"]), effects, passive=_passive_names(data.get("passive", ()))
-        )
+        effects = [effect_of_table(key, values) for key, values in data["effects"].items()]
+        robot = Robot.from_dict(data["robot"], package_dirs, meshes)
+        return cls(robot, effects, passive=_passive_names(data.get("passive", ())))
 
     @cached_property
     def _without_kernel(self) -> tuple[str, ...]:
@@ -340,47 +347,11 @@ def require_plannable(scene: Scene, torques: bool = True) -> None:
         check_mass_matrix(scene.model)
 
 
-def _effect(key: str, values: object, name: str = "effects") -> Effect:
-    """An effect from its key and its fields as a file has them. name: of the table of effects.
-
-    Raises SceneError.
-    """
-    if key not in REGISTRY:
-        raise SceneError(f"there is no effect {key!r}; {nearest(str(key), REGISTRY)}")
-    known = {each.name for each in dataclasses.fields(REGISTRY[key]) if each.init}
-    if not isinstance(values, Mapping):
-        raise SceneError(f"effect {key!r} takes {', '.join(sorted(known))}, not {values!r}.")
-    for given in values:
-        if given not in known:
-            hint = nearest(str(given), known)
-            raise SceneError(f"unknown key `{name}.{key}.{given}`; {hint}")
-    for each in dataclasses.fields(REGISTRY[key]):
-        needed = each.default is MISSING and each.default_factory is MISSING
-        if needed and each.name not in values:
-            raise SceneError(f"`{name}.{key}.{each.name}` is missing.")
-    return REGISTRY[key](**values)
-
-
 def _passive_names(names: object) -> tuple[str, ...]:
     """Names as a tuple. Raises SceneError for anything but a list of texts."""
     if not isinstance(names, Sequence) or not all(isinstance(name, str) for name in names):
         raise SceneError(f"passive is a list of joint names, not {names!r}.")
     return tuple(names)
-
-
-def as_effects(given: object, name: str = "effects") -> tuple[Effect, ...]:
-    """Effects as a tuple. name: of their table in messages.
-
-    Raises SceneError for anything but a list or a table of effects.
-    """
-    effects: tuple[Any, ...] = (None,)
-    if isinstance(given, Mapping):
-        effects = tuple(_effect(key, values, name) for key, values in given.items())
-    elif isinstance(given, Iterable) and not isinstance(given, str | np.ndarray):
-        effects = tuple(given)
-    if not all(isinstance(each, Effect) for each in effects):
-        raise SceneError(f"effects is a list such as [hovi.effects.Gravity()], not {given!r}.")
-    return effects
 
 
 def _passive(robot: Robot, names: Sequence[str]) -> tuple[str, ...]:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Iterable, Mapping
+from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
@@ -11,6 +13,7 @@ import numpy.typing as npt
 
 from hovi.checks.arguments import check_arguments
 from hovi.errors import InputError
+from hovi.robot.meshes.stored_meshes import StoredMeshes
 from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
 from hovi.system.dataclass import dataclass
@@ -76,8 +79,16 @@ class SegmentScenes:
         return {"scenes": scenes, "segments": segments, "scenes_sha256": _digest(scenes)}
 
     @classmethod
-    def from_tables(cls, tables: dict[str, Any]) -> Self:
-        """The inverse of `to_tables`. Raises InputError for anything else."""
+    def from_tables(
+        cls,
+        tables: dict[str, Any],
+        package_dirs: Iterable[str | Path] = (),
+        meshes: Mapping[str, StoredMeshes] | None = None,
+    ) -> Self:
+        """The inverse of `to_tables`. Raises InputError for anything else.
+
+        package_dirs, meshes: see `Scene.from_dict`.
+        """
         missing = {"scenes", "segments", "scenes_sha256"} - set(tables)
         if missing:
             raise InputError(f"a motion in segments lacks {min(missing)!r}")
@@ -88,7 +99,7 @@ class SegmentScenes:
             raise InputError("its segments are not a list of [number of a scene, intervals]")
         if {number for number, _ in segments} != set(range(len(scenes))):
             raise InputError("its segments do not use every one of its scenes")
-        known = [Scene.from_dict(scene) for scene in scenes]
+        known = [Scene.from_dict(scene, package_dirs, meshes) for scene in scenes]
         numbers, counts = zip(*segments, strict=True)
         return cls(tuple(known[i] for i in numbers), tuple(counts))
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Self
 
-from hovi.checks.arguments import check_arguments
+from hovi.checks.arguments import check_arguments_except
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError, StudyError
 from hovi.planning.task_file.messages import TomlText
@@ -62,7 +62,7 @@ class StudyReport:
         return self.done == self.count
 
 
-@check_arguments
+@check_arguments_except("package_dirs")
 @dataclass(frozen=True, eq=False)
 class Study:
     """Many plans of one scene, with fields that vary.
@@ -207,8 +207,12 @@ class Study:
         return read_table(Path(folder) / RUNS).to_pandas()
 
     @staticmethod
-    def motion(folder: str | Path, key: str) -> Trajectory:
-        """The motion of a plan. key: of the plan. Raises StudyError if there is none."""
+    def motion(folder: str | Path, key: str, package_dirs: Iterable[str | Path] = ()) -> Trajectory:
+        """The motion of a plan. Raises StudyError if there is none.
+
+        key: of the plan. package_dirs: folders with the packages of the meshes of a robot that was
+            loaded from a file, which a study does not store.
+        """
         index = Index(Path(folder))
         index.read_new()
         done = index.done(key)
@@ -216,7 +220,7 @@ class Study:
             why = "no plan" if done is None else "no motion of the plan"
             raise StudyError(f"the study in {folder} has {why} with the key {key!r}.")
         try:
-            return motion_from(done.motion.read(Path(folder)))
+            return motion_from(done.motion.read(Path(folder)), package_dirs)
         except (OSError, ValueError) as damaged:
             raise StudyError(f"the motion {key!r} in {folder} is damaged: {damaged}.") from None
 

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import base64
+import io
 import itertools
 import math
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -28,6 +32,7 @@ with warnings.catch_warnings():
     import meshcat
     import meshcat.geometry
     from pinocchio.visualize import MeshcatVisualizer
+    from pinocchio.visualize.meshcat_visualizer import DaeMeshGeometry
 
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
@@ -99,6 +104,43 @@ def drawn(
     return Drawn(visualizer, tracks, tuple(ghosts), _view(viewer, lower, upper))
 
 
+class _RobotVisualizer(MeshcatVisualizer):  # type: ignore[misc]
+    """Pinocchio's, which also draws the meshes that came with a motion; no file of these exists."""
+
+    def __init__(self, robot: Robot, visual: pin.GeometryModel) -> None:
+        super().__init__(robot.model, None, visual)
+        self._stored = robot.source.meshes
+
+    def loadMeshFromFile(self, geometry_object: pin.GeometryObject) -> Any:
+        """The mesh of a shape, as meshcat has it. The name is Pinocchio's."""
+        name = self._stored.name_at(geometry_object.meshPath)
+        if name is None:
+            return super().loadMeshFromFile(geometry_object)
+        mesh = self._stored.meshes[name]
+        content = self._stored.content(mesh.sha256)
+        suffix = Path(geometry_object.meshPath).suffix.lower()
+        if suffix == ".stl":
+            return meshcat.geometry.StlMeshGeometry.from_stream(io.BytesIO(content))
+        if suffix == ".obj":
+            return meshcat.geometry.ObjMeshGeometry.from_stream(io.BytesIO(content))
+        textures = {key: self._stored.content(each) for key, each in mesh.textures.items()}
+        return _Collada(content.decode(), textures)
+
+
+class _Collada(DaeMeshGeometry):  # type: ignore[misc]
+    """A Collada mesh as Pinocchio sends it to a page, from its content instead of its file."""
+
+    def __init__(self, content: str, textures: Mapping[str, bytes]) -> None:
+        meshcat.geometry.ReferenceSceneElement.__init__(self)
+        self.path = self.material = None
+        self.intrinsic_transform = np.eye(4)
+        self.dae_raw = content
+        self.img_resources = {
+            str(Path(name)): f"data:image/png;base64,{base64.b64encode(each).decode()}"
+            for name, each in textures.items()
+        }
+
+
 def ghost_color(k: int) -> str:
     """The color of the k-th motion that is compared, k = 1, 2, ..."""
     return _GHOST_COLORS[(k - 1) % len(_GHOST_COLORS)]
@@ -112,7 +154,7 @@ def _shapes(robot: Robot) -> pin.GeometryModel:
 def _visualizer(
     robot: Robot, visual: pin.GeometryModel, viewer: meshcat.Visualizer, root: str
 ) -> MeshcatVisualizer:
-    visualizer = MeshcatVisualizer(robot.model, None, visual)
+    visualizer = _RobotVisualizer(robot, visual)
     visualizer.initViewer(viewer=viewer)
     visualizer.loadViewerModel(rootNodeName=root)
     return visualizer

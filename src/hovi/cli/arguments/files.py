@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -51,16 +52,19 @@ def beside(file: Path, suffix: str) -> Path:
     return file.with_suffix(suffix)
 
 
-def load_shown(path: Path, warned: bool = True) -> Trajectory:
+def load_shown(
+    path: Path, package_dirs: Sequence[Path] | None = None, warned: bool = True
+) -> Trajectory:
     """The same, after its cautions on stderr.
 
+    package_dirs: folders with the packages of its robot's meshes.
     warned: whether hovi warns of those against executing the motion when it is shown.
     """
     import sys
 
     from hovi.discrete.output.caution import cautions_of
 
-    motion = load_trajectory(path)
+    motion = load_trajectory(path, package_dirs)
     for each in cautions_of(motion.metadata):
         if not (warned and each.is_against):
             with suppress(OSError):  # stderr may be closed
@@ -68,8 +72,8 @@ def load_shown(path: Path, warned: bool = True) -> Trajectory:
     return motion
 
 
-def load_trajectory(path: Path) -> Trajectory:
+def load_trajectory(path: Path, package_dirs: Sequence[Path] | None = None) -> Trajectory:
     """A motion written by `hovi plan --out`."""
     from hovi.discrete.trajectory import Trajectory
 
-    return Trajectory.load(path)
+    return Trajectory.load(path, package_dirs or ())

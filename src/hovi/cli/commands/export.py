@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from hovi.cli.arguments.robots import PackageDirs
+
 if TYPE_CHECKING:
     from hovi.exchange.formats import ExportFormat
 
@@ -30,6 +32,7 @@ def export(
     rate: Annotated[
         float | None, typer.Option(help="Samples per second; default: that of the format.")
     ] = None,
+    package_dir: PackageDirs = None,
 ) -> None:
     """Export a motion for other programs.
 
@@ -41,7 +44,7 @@ def export(
     chosen = _format(format_, csv, given)
     target = check_output(given or _beside(file, chosen.suffix), *chosen.suffixes)
     _require_other_file(target, file)
-    chosen.write(load_shown(file), target, rate)
+    chosen.write(load_shown(file, package_dir), target, rate)
     print(f"wrote {target}")
 
 

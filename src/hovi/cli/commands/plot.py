@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from hovi.cli.arguments.robots import PackageDirs
+
 
 def plot(
     file: Annotated[Path, typer.Argument(metavar="FILE.npz", help="A motion.")],
@@ -17,6 +19,7 @@ def plot(
             help="Path of the figure (or .pdf, .svg); default: FILE.png.",
         ),
     ] = None,
+    package_dir: PackageDirs = None,
 ) -> None:
     """Plot q, v and tau of a motion; for a planar two-link arm, its swept surface as well."""
     from hovi.cli.arguments.files import beside, check_output, load_shown
@@ -26,5 +29,5 @@ def plot(
     if target.is_dir():
         target = target / f"{file.stem}.png"
     check_output(target, ".png", ".pdf", ".svg")
-    for picture in plot_all(load_shown(file, warned=False), target):
+    for picture in plot_all(load_shown(file, package_dir, warned=False), target):
         print(f"wrote {picture}")

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from hovi.cli.arguments.robots import PackageDirs
+
 if TYPE_CHECKING:
     from hovi.discrete.trajectory import Trajectory
 
@@ -26,18 +28,21 @@ def replay(
     browser: Annotated[
         bool, typer.Option(help="Open the page in a browser, or only print its address.")
     ] = True,
+    package_dir: PackageDirs = None,
 ) -> None:
     """Serve a page that plays a motion until Ctrl-C, or write the page to a file."""
     from hovi.cli.arguments.files import check_output, load_shown
 
-    others = [load_shown(each) for each in compare or ()]
+    if html is not None:
+        check_output(html, ".html")
+    others = [load_shown(each, package_dir) for each in compare or ()]
+    motion = load_shown(file, package_dir)
     if html is None:
-        _serve(load_shown(file), others, speed, loop, browser)
+        _serve(motion, others, speed, loop, browser)
         return
     from hovi.viewing.replay_session import write_html
 
-    check_output(html, ".html")
-    write_html(load_shown(file), html, compare=others, speed=speed, loop=loop)
+    write_html(motion, html, compare=others, speed=speed, loop=loop)
     print(f"wrote {html}")
 
 

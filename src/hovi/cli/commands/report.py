@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from hovi.cli.arguments.robots import PackageDirs
+
 
 def report(
     file: Annotated[Path, typer.Argument(metavar="FILE.npz", help="A motion.")],
@@ -14,11 +16,12 @@ def report(
         Path | None,
         typer.Option(metavar="OUT.html", help="Output file; default: FILE with .html."),
     ] = None,
+    package_dir: PackageDirs = None,
 ) -> None:
     """Write replay, curves, certificate, effects and scene of a motion to one offline file."""
     from hovi.cli.arguments.files import beside, check_output, load_shown
     from hovi.viewing.documents.report import write_report
 
     target = check_output(html or beside(file, ".html"), ".html")
-    write_report(load_shown(file), target)
+    write_report(load_shown(file, package_dir), target)
     print(f"wrote {target}")

@@ -8,6 +8,8 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
+from hovi.cli.arguments.robots import PackageDirs
+
 RUN = "run"
 """The subcommand that a study file stands for."""
 
@@ -99,6 +101,7 @@ def show(
     worst: Annotated[
         Path | None, typer.Option(metavar="F.html", help="Write a page with the worst ten motions.")
     ] = None,
+    package_dir: PackageDirs = None,
     json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
     """Print how the plans of a study ended, and draw them."""
@@ -124,7 +127,7 @@ def show(
     elif picture is not None:
         draw_map(plans, picture, parameters, value)
     if worst is not None:
-        write_worst(plans, worst)
+        write_worst(plans, worst, package_dirs=package_dir or ())
     if not json:
         for path in (histograms, picture, worst):
             if path is not None:
@@ -136,6 +139,7 @@ def motion(
     folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="The folder of a study.")],
     cell: Annotated[int, typer.Argument(metavar="CELL", help="The number of the cell.")],
     out: Annotated[Path, typer.Option(metavar="F.npz", help="Path of the motion.")],
+    package_dir: PackageDirs = None,
 ) -> None:
     """Write the motion of one cell to a file, such as for hovi replay."""
     from hovi.cli.arguments.files import check_output
@@ -150,7 +154,7 @@ def motion(
     if cell not in plans.columns["cell"]:
         raise InputError(f"the study in {folder} has no plan of cell {cell}.")
     key = plans.columns["key"][plans.columns["cell"].index(cell)]
-    Study.motion(folder, key).save(out)
+    Study.motion(folder, key, package_dir or ()).save(out)
     print(f"wrote    {out}")
 
 

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from hovi.checks.names import as_names
 from hovi.errors import HoviError, InputError, nearest
 from hovi.planning.obstacles.mesh import ConvexParts, Mesh
 from hovi.planning.obstacles.obstacle import Obstacle, obstacle_of_kind
@@ -20,7 +21,6 @@ from hovi.planning.obstacles.primitives import (
     HalfSpace,
     Sphere,
 )
-from hovi.robot.loading import as_names
 
 KINDS: dict[str, type[Obstacle]] = {
     "sphere": Sphere,

@@ -16,6 +16,7 @@ from hovi.checks.shapes import numbers_of
 from hovi.checks.tables import entries_of
 from hovi.discrete.state import State
 from hovi.effects import Effect
+from hovi.effects.registration import as_effects
 from hovi.errors import InputError
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.limits import Limits
@@ -23,7 +24,6 @@ from hovi.planning.problem.notation.ends import End, as_end
 from hovi.planning.problem.units import SECONDS_IN_WORDS, seconds
 from hovi.planning.search.options import PlanOptions
 from hovi.robot.robot import Robot
-from hovi.scene.scene import as_effects
 from hovi.system.dataclass import dataclass
 
 MAX_SEGMENTS = 1000

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from pathlib import Path
 from xml.parsers import expat
 
@@ -33,12 +33,7 @@ def check_mesh(path: Path, root: Path, drawn: bool) -> bytes:
     Raises ModelError for another type of file, one that is too large or unreadable, and a name that
     leaves `root` or is no regular file there.
     """
-    kind = path.suffix.lower()
-    if kind not in MESH_TYPES:
-        raise ModelError(
-            f"mesh {path.name!r} is not of a type that hovi reads ({', '.join(MESH_TYPES)}): "
-            "convert it to one of them."
-        )
+    kind = _type_of(path)
     try:
         require_file(path, MAX_MESH_BYTES)
         content = path.read_bytes()
@@ -50,6 +45,37 @@ def check_mesh(path: Path, root: Path, drawn: bool) -> bytes:
         if drawn:
             _check_text(path.name, content)
     return content
+
+
+def check_stored(path: Path, content: bytes, textures: Collection[str], drawn: bool) -> None:
+    """The same check of a mesh that the file of a motion brought.
+
+    path: what stands for its path. textures: the names of those that came with it.
+    """
+    _type_of(path)
+    missing = [name for name in shown_textures(path, content) if name not in textures]
+    if drawn and missing:
+        raise ModelError(f"mesh {path.name!r} names {missing[0]!r}, which its motion has not kept.")
+    if drawn and path.suffix.lower() in _FILES_IN:
+        _check_text(path.name, content)
+
+
+def shown_textures(path: Path, content: bytes) -> list[str]:
+    """The names of the textures of a mesh that a page shows: those of Collada files alone."""
+    if path.suffix.lower() != ".dae":
+        return []
+    return [name for name, is_shown in _textures(path.name, content) if is_shown]
+
+
+def _type_of(mesh: Path) -> str:
+    """The suffix of a mesh. Raises ModelError for another type of file."""
+    kind = mesh.suffix.lower()
+    if kind not in MESH_TYPES:
+        raise ModelError(
+            f"mesh {mesh.name!r} is not of a type that hovi reads ({', '.join(MESH_TYPES)}): "
+            "convert it to one of them."
+        )
+    return kind
 
 
 def is_inside(path: Path, folder: Path) -> bool:

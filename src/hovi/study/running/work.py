@@ -10,6 +10,7 @@ import socket
 import tempfile
 import time
 import warnings
+from collections.abc import Iterable
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -253,14 +254,18 @@ def _met(task: Task, target: FrameGoal, other: State | FrameGoal) -> State:
 
 
 def _bytes_of(motion: Trajectory) -> bytes:
+    """The file of a motion, without the meshes that all motions of a study have in common."""
     stream = io.BytesIO()
-    motion.save(stream)
+    motion.save(stream, meshes=False)
     return stream.getvalue()
 
 
-def motion_from(content: bytes) -> Trajectory:
-    """The motion of an npz file's bytes. Raises TrajectoryFileError."""
+def motion_from(content: bytes, package_dirs: Iterable[str | Path] = ()) -> Trajectory:
+    """The motion of an npz file's bytes. Raises TrajectoryFileError.
+
+    package_dirs: folders with the packages of its meshes.
+    """
     with tempfile.NamedTemporaryFile(suffix=".npz") as file:
         file.write(content)
         file.flush()
-        return Trajectory.load(file.name)
+        return Trajectory.load(file.name, package_dirs)

@@ -6,7 +6,7 @@ import html
 import json
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -53,16 +53,19 @@ _MOTION = """<details data-replay="{number}"{opened}><summary>{label}</summary><
 """
 
 
-def write_worst(plans: Plans, path: Path, count: int = 10) -> int:
+def write_worst(
+    plans: Plans, path: Path, count: int = 10, package_dirs: Iterable[str | Path] = ()
+) -> int:
     """Write a page with the minima that cost most, each of which is opened to be replayed.
 
+    package_dirs: folders with the packages of the robot's meshes.
     Returns how many there are. Raises StudyError without a stored motion, and DisplayError.
     """
     rows = plans.worst(count)
     if not rows:
         raise StudyError(f"the study in {plans.folder} has no minimum to be replayed.")
     motions = [_motion(plans, row, number) for number, row in enumerate(rows)]
-    shared, replays = shared_pieces([_replay(plans, row) for row in rows])
+    shared, replays = shared_pieces([_replay(plans, row, package_dirs) for row in rows])
     title = f"the {len(rows)} costliest of {len(plans):,} plans"
     page = _PAGE.format(
         title=title, motions="".join(motions), shared=_script(shared), replays=_script(replays)
@@ -101,8 +104,9 @@ def _script(data: Any) -> str:
     return json.dumps(data).replace("<", "\\u003c")
 
 
-def _replay(plans: Plans, row: int) -> str:
-    return page_of(Study.motion(plans.folder, plans.columns["key"][row])).offline_html()
+def _replay(plans: Plans, row: int, package_dirs: Iterable[str | Path]) -> str:
+    motion = Study.motion(plans.folder, plans.columns["key"][row], package_dirs)
+    return page_of(motion).offline_html()
 
 
 def _motion(plans: Plans, row: int, number: int) -> str:
