@@ -20,8 +20,8 @@ import pytest
 
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import DiscretePath, Grid
+from hovi.discrete.output.stored_torque import StoredTorque, chebyshev_points
 from hovi.discrete.state import State
-from hovi.discrete.stored_torque import StoredTorque, chebyshev_points
 from hovi.discrete.trajectory import Trajectory
 from hovi.effects import Gravity
 from hovi.errors import HoviWarning, InputError, TrajectoryFileError

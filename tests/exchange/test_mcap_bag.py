@@ -15,7 +15,7 @@ from mcap_ros2.decoder import DecoderFactory
 from mcap_ros2.writer import Writer
 
 import hovi
-from hovi.discrete.stored_torque import StoredTorque
+from hovi.discrete.output.stored_torque import StoredTorque
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError
 from hovi.exchange.link_poses import links_of

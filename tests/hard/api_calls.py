@@ -28,7 +28,7 @@ import numpy as np
 
 import hovi
 from hard.verdict import Mutant, Verdict, judge
-from hovi.discrete.stored_torque import StoredTorque
+from hovi.discrete.output.stored_torque import StoredTorque
 from hovi.flows.legendre_transforms import legendre
 from hovi.robot.space.configuration_space import ConfigurationSpace
 from hovi.scene.segment_scenes import SegmentScenes
@@ -358,8 +358,11 @@ def _motions() -> list[Call]:
             **{"grid": trajectory.grid, "path": path, "momenta": trajectory.momenta},
             **{"scene": trajectory.scene, "metadata": {}, "torque": None},
         ),
-        *(own(trajectory, name, [0.0, 0.5]) for name in ("sample", "configurations", "jet")),
-        *(own(trajectory, name, k, s) for name in ("jet_intervals", "sample_intervals")),
+        *(
+            own(trajectory, name, [0.0, 0.5])
+            for name in ("sample", "configurations", "jet", "positions")
+        ),
+        *(own(trajectory, f"{name}_intervals", k, s) for name in ("jet", "sample", "positions")),
         call(hovi.extremes, trajectory),
         call(hovi.limit_sets),
         own(hovi.limit_sets()["panda"], "beyond", 2),

@@ -101,7 +101,8 @@ def verdict(mutant: Mutant, folder: Path) -> tuple[Verdict, str]:
 def error_in(motion: Trajectory, folder: Path) -> str:
     """The error in a loaded motion; "" if there is none."""
     sample = motion.sample(np.linspace(0.0, motion.duration, 50))
-    if not all(np.isfinite(part).all() for part in sample):
+    positions = motion.positions(np.linspace(0.0, motion.duration, 50))
+    if not all(np.isfinite(part).all() for part in (*sample, positions)):
         return "its samples are not finite"
     inner = np.arange(motion.grid.intervals - 1)
     before = motion.sample_intervals(inner, np.ones(inner.size))
@@ -235,7 +236,14 @@ def _array_shape(entries: Entries, random: Random) -> None:
     entries[name] = _npy(np.ones(random.choice(shapes)))
 
 
+def _full_turns(entries: Entries, random: Random) -> None:
+    joint, count = random.choice(["shoulder", "", "x"]), random.choice(UNUSUAL_VALUES)
+    turns = random.choice([{joint: count}, count, {}])
+    edit(entries, lambda header: header.update(turns=turns))
+
+
 _CHANGES: tuple[Change, ...] = (
+    _full_turns,
     *(
         _header_value,
         _header_value,

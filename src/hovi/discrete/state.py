@@ -14,7 +14,8 @@ from hovi.errors import InputError, nearest, warn
 from hovi.robot.robot import Robot
 from hovi.robot.space.angle_ranges import angles_in_degrees
 from hovi.robot.space.coordinates import Coordinates
-from hovi.robot.space.joint_table import configuration_of, rates_of
+from hovi.robot.space.joint_table import angles_in, configuration_of, rates_of, with_angles
+from hovi.robot.space.turns import turns_of
 from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
@@ -40,7 +41,9 @@ class State:
     and with a jerk for k = 4; for k = 1 it has no velocity.
 
     q: configuration, shape (nq,), in [rad] or [m]; or the name of a pose of the robot, or a table
-        of all joints, in which a continuous joint takes its angle.
+        of all joints, in which a continuous joint takes its angle; or one number per joint, (nv,),
+        where continuous joints are the only ones with nq > nv. A start keeps the full turns of such
+        angles; a goal beyond (-pi, pi] is reached at its angle, another one the shortest way.
     v, a, jerk: velocity, acceleration and its rate, shape (nv,), per [s], [s^2], [s^3]; zero by
         default; or tables of joints, of which those that are left out have zero.
     free, free_velocity, free_acceleration, free_jerk: joints whose configuration, velocity, ... is
@@ -94,15 +97,28 @@ class State:
         rate = np.zeros(coordinates.nv) if given is None else given
         return coordinates.check_velocity(rate, f"{name}.{key}")
 
+    def angles_on(self, coordinates: Coordinates) -> Array:
+        """The angles that q gives of continuous joints, NaN elsewhere, shape (nv,), in [rad]."""
+        return angles_in(self.q, coordinates)
+
+    def turns_made(self, coordinates: Coordinates) -> dict[str, int]:
+        """Full turns of the continuous joints at this state, of those that have made any."""
+        turns = turns_of(self.angles_on(coordinates))
+        return {coordinates.coordinate_names[i]: int(turns[i]) for i in np.flatnonzero(turns)}
+
     def resolved(self, coordinates: Coordinates, name: str) -> State:
-        """The state with arrays in place of tables and names of poses. Raises as `on` does."""
+        """The state with arrays in place of tables and names of poses. Raises as `on` does.
+
+        Angles of continuous joints stay in a table.
+        """
         if not any(isinstance(x, str | Mapping) for x in (self.q, self.v, self.a, self.jerk)):
             return self
         rates = {
             key: None if getattr(self, key) is None else self._rate(key, coordinates, name)
             for key in ("v", "a", "jerk")
         }
-        return replace(self, q=self.on(coordinates, name)[0], **rates)  # type: ignore[arg-type]
+        q = with_angles(self.on(coordinates, name)[0], self.angles_on(coordinates), coordinates)
+        return replace(self, q=q, **rates)  # type: ignore[arg-type]
 
     def require_order(self, order: int, name: str) -> None:
         """Raise InputError for derivatives that an end of a motion of this order does not have."""
@@ -286,12 +302,20 @@ def as_state(state: State | Positions, coordinates: Coordinates, name: str = "st
     return whole.resolved(coordinates, name)
 
 
-def warn_of_degrees(robot: Robot, configurations: Sequence[Array]) -> None:
-    """Warn if angles of successive configurations (nq,) of a motion look like degrees."""
+def warn_of_degrees(
+    robot: Robot, configurations: Sequence[Array], turned: Sequence[Array] = ()
+) -> None:
+    """Warn if angles of successive configurations (nq,) of a motion look like degrees.
+
+    turned: angles that they give of continuous joints, (nv,) each, NaN elsewhere.
+    """
     index, coordinates = robot.space.plain
-    q = np.stack(configurations)[:, index]
-    names = [robot.coordinate_names[i] for i in coordinates]
-    angles = ~robot.sliding[coordinates]
-    note = angles_in_degrees(names, angles, q, robot.lower[index], robot.upper[index])
+    q, lower, upper = np.zeros((len(configurations), robot.nv)), *np.full((2, robot.nv), np.inf)
+    lower *= -1.0
+    q[:, coordinates] = np.stack(configurations)[:, index]
+    lower[coordinates], upper[coordinates] = robot.lower[index], robot.upper[index]
+    for row, angles in zip(q, turned, strict=False):
+        row[~np.isnan(angles)] = angles[~np.isnan(angles)]
+    note = angles_in_degrees(robot.coordinate_names, ~robot.sliding, q, lower, upper)
     if note:
         warn(f"{note}; configurations are in radians.")

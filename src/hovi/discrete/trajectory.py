@@ -18,13 +18,12 @@ from hovi.checks.arguments import check_arguments_except
 from hovi.checks.shapes import numbers_of, require_shape
 from hovi.discrete import trajectory_file
 from hovi.discrete.grid import DiscretePath, Grid
-from hovi.discrete.interval_paths import scaled_data
 from hovi.discrete.node_continuity import require_continuous
 from hovi.discrete.output.export_methods import ExportMethods
-from hovi.discrete.output.interpolant import interpolant_rows
 from hovi.discrete.output.path_sampler import PathSampler
+from hovi.discrete.output.stored_torque import StoredTorque
 from hovi.discrete.output.trajectory_summary import TrajectorySummary
-from hovi.discrete.stored_torque import StoredTorque
+from hovi.discrete.positions import Positions, displacements
 from hovi.errors import HoviError, InputError, TrajectoryFileError
 from hovi.robot.robot import Robot
 from hovi.robot.source import absolute_folders
@@ -59,7 +58,7 @@ class Sample(NamedTuple):
 
 @check_arguments_except("package_dirs")
 @dataclass(frozen=True, eq=False, repr=False)
-class Trajectory(ExportMethods, TrajectorySummary):
+class Trajectory(Positions, ExportMethods, TrajectorySummary):
     """A motion of a scene's robot on a grid, with its costates.
 
     grid: the intervals, each with its step and scheme.
@@ -70,6 +69,7 @@ class Trajectory(ExportMethods, TrajectorySummary):
     metadata: JSON-compatible data about the origin (cost, status, versions), without wall times.
     torque: torques by interval if there is no scene to compute them.
     segments: the scenes of a motion in segments.
+    turns: full turns of continuous joints at the start, by joint, that q does not show.
     """
 
     grid: Grid
@@ -79,12 +79,14 @@ class Trajectory(ExportMethods, TrajectorySummary):
     metadata: Mapping[str, Any] = field(default_factory=dict)
     torque: StoredTorque | None = None
     segments: SegmentScenes | None = None
+    turns: Mapping[str, int] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Raise InputError for arrays that do not match the grid and the robot."""
         _check_shapes(self)
         if self.scene is None and self.torque is None and self.segments is None:
             raise InputError("a trajectory needs a scene, or the torques themselves.")
+        _ = self.turns_at_start
 
     @property
     def robot(self) -> Robot | None:
@@ -247,11 +249,7 @@ class Trajectory(ExportMethods, TrajectorySummary):
             raise InputError(f"this motion has derivatives up to {most}, not {order}.")
         top = max(2, self.grid.order, order)
         h, path = self.grid.steps[k][:, None], self.path
-        scaled = np.empty((len(k), top + 1, path.v.shape[1]))
-        for scheme, members in self.grid.groups:
-            here = np.isin(k, members)
-            data = scaled_data(path, k[here], h[here], scheme.inner_modes)
-            scaled[here] = interpolant_rows(scheme, s[here], top) @ data
+        scaled = displacements(self.grid, path, k, s, top)
         x, *rates = (scaled[:, j] / h**j for j in range(top + 1))
         if self.space is None:
             return (path.q[k] + x, *rates)[: order + 1]
@@ -296,6 +294,7 @@ class Trajectory(ExportMethods, TrajectorySummary):
             "scene": scene,
             "scene_sha256": trajectory_file.digest(scene),
             **segments,
+            **({"turns": dict(self.turns)} if self.turns else {}),
         }
         kept = trajectory_file.meshes_of(self._robots) if meshes else {}
         trajectory_file.warn_of_hashes(kept)
@@ -329,6 +328,7 @@ class Trajectory(ExportMethods, TrajectorySummary):
                 metadata=metadata,
                 torque=StoredTorque(arrays[_TORQUE]) if stored else None,
                 segments=segments,
+                turns=header.get("turns", {}),
             )
             require_continuous(loaded.path, loaded.grid, loaded.space)
             trajectory_file.require_unchanged(header, arrays)

@@ -8,7 +8,6 @@ import numpy.typing as npt
 from hovi.discrete.trajectory import Trajectory
 from hovi.exchange.samples import times_of
 from hovi.system.dataclass import dataclass
-from hovi.viewing.curves.unwrapped_angles import unwrapped
 
 Array = npt.NDArray[np.float64]
 
@@ -18,8 +17,9 @@ class JointMotion:
     """The joints with one position at M times.
 
     names: of the J joints. times: shape (M,), strictly increasing, in [s].
-    q, v, a: shape (M, J), in [rad] or [m] and per [s]; angles of continuous joints go on beyond a
-        full turn. tau: shape (M, J), in [N m] or [N]; (M, 0) for a Lagrangian without torques.
+    q, v, a: shape (M, J), in [rad] or [m] and per [s]; angles of continuous joints begin at the
+        turns of the start and go on beyond a full turn.
+    tau: shape (M, J), in [N m] or [N]; (M, 0) for a Lagrangian without torques.
     others: names of the joints with several coordinates, such as a free-flyer, which are left out.
     """
 
@@ -38,9 +38,8 @@ def joint_motion(trajectory: Trajectory, rate: float) -> JointMotion:
     rate: samples per second. Raises InputError for an invalid one.
     """
     times = times_of(trajectory, rate)
-    q, v, a, tau = trajectory.sample(times)
-    if trajectory.space is not None:
-        q = unwrapped(trajectory.space, q)
+    _, v, a, tau = trajectory.sample(times)
+    q = trajectory.positions(times)
     names = np.array(trajectory.coordinate_names, dtype=object)
     single = np.array([not name.endswith("]") for name in names], dtype=bool)
     others = dict.fromkeys(name.rpartition("[")[0] for name in names[~single])

@@ -12,7 +12,7 @@ from hovi.checks.arguments import check_arguments_except
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError, expect
 from hovi.exchange.libraries import library
-from hovi.exchange.mujoco_model import angles, controls, left_out, mjcf, mujoco_scenes
+from hovi.exchange.mujoco_model import controls, left_out, mjcf, mujoco_scenes
 from hovi.system.dataclass import dataclass
 from hovi.system.summary import Summarized, Summary
 
@@ -79,7 +79,7 @@ def replay_in_mujoco(trajectory: Trajectory, step: float = 1e-4) -> MujocoReplay
     lengths = trajectory.grid.steps
     counts = np.ceil(lengths / step * (1 - 1e-12)).astype(np.intp)  # of the steps in each interval
     ends = np.cumsum([0, *(intervals for _, intervals in scenes)])
-    q, v = angles(trajectory, trajectory.q[:1])[0], trajectory.v[0]
+    q, v = trajectory.positions(0.0)[0], trajectory.v[0]
     simulated = [q[None]]
     for (scene, _), first, last in zip(scenes, ends[:-1], ends[1:], strict=True):
         k, s = _steps(counts[first:last], first)
@@ -98,7 +98,7 @@ def replay_in_mujoco(trajectory: Trajectory, step: float = 1e-4) -> MujocoReplay
         q = positions[-1]
     k, s = _steps(counts, 0)
     times = np.append(trajectory.t[k] + s * lengths[k], trajectory.duration)
-    planned = angles(trajectory, trajectory.configurations(times))
+    planned = trajectory.positions(times)
     missing = tuple(dict.fromkeys(key for scene, _ in scenes for key in left_out(scene)))
     names = scenes[0][0].robot.coordinate_names
     return MujocoReplay(names, times, np.concatenate(simulated), planned, missing)

@@ -13,7 +13,7 @@ import numpy as np
 
 from hovi.discrete.output.caution import caution_lines
 from hovi.discrete.trajectory import Trajectory
-from hovi.exchange.mujoco_model import angles, controls, left_out, mjcf, mujoco_scene
+from hovi.exchange.mujoco_model import controls, left_out, mjcf, mujoco_scene
 from hovi.exchange.samples import times_of
 from hovi.exchange.whole_export import whole_export
 
@@ -33,7 +33,7 @@ def write_mujoco(trajectory: Trajectory, path: str | os.PathLike[str], rate: flo
     driven = np.setdiff1d(np.arange(scene.robot.nv), scene.passive_coordinates)
     root, tau = mjcf(scene), controls(scene, q, v, a)[:, driven]
     keys = ElementTree.SubElement(root, "keyframe")
-    for t, x, rates, control in zip(times, angles(trajectory, q), v, tau, strict=True):
+    for t, x, rates, control in zip(times, trajectory.positions(times), v, tau, strict=True):
         ElementTree.SubElement(
             keys, "key", name=f"t={t:.9g}", time=repr(float(t)), qpos=_text(x), qvel=_text(rates),
             ctrl=_text(control),

@@ -16,7 +16,6 @@ from hovi.effects import Effect, MovingBase, ViscousFriction
 from hovi.errors import InputError
 from hovi.robot.space.joint_kinds import kind_of
 from hovi.scene.scene import Scene
-from hovi.viewing.curves.unwrapped_angles import unwrapped
 
 Array = npt.NDArray[np.float64]
 Element = ElementTree.Element
@@ -90,13 +89,6 @@ def damping_of(scene: Scene) -> tuple[float, ...]:
         if isinstance(each, ViscousFriction):
             found = found + each.values(scene.robot)
     return tuple(found.tolist())
-
-
-def angles(trajectory: Trajectory, q: Array) -> Array:
-    """Positions of MuJoCo's joints at configurations (M, nq), shape (M, nv)."""
-    if trajectory.space is None:
-        return q
-    return unwrapped(trajectory.space, q)
 
 
 def mjcf(scene: Scene) -> Element:

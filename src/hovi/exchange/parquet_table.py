@@ -10,7 +10,7 @@ from hovi.discrete.trajectory import Trajectory
 from hovi.exchange.libraries import library
 from hovi.exchange.samples import times_of
 from hovi.exchange.whole_export import whole_export
-from hovi.viewing.csv_table import column_names
+from hovi.viewing.csv_table import angle_indices, column_names
 
 
 def write_parquet(trajectory: Trajectory, path: str | os.PathLike[str], rate: float) -> None:
@@ -24,7 +24,8 @@ def write_parquet(trajectory: Trajectory, path: str | os.PathLike[str], rate: fl
     times = times_of(trajectory, rate)
     pyarrow = library("pyarrow", "pyarrow", "the format 'parquet'")
     parquet = library("pyarrow.parquet", "pyarrow", "the format 'parquet'")
-    columns = [times, *(column for x in trajectory.sample(times) for column in x.T)]
+    angles = trajectory.positions(times)[:, angle_indices(trajectory)]
+    columns = [times, *(column for x in (*trajectory.sample(times), angles) for column in x.T)]
     metadata = {
         "units": "SI, radians",
         "duration": repr(trajectory.duration),

@@ -6,6 +6,9 @@ torques of effects as forces. [MarsdenWest2001, section 3.2]
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import field
+
 import numpy as np
 import numpy.typing as npt
 
@@ -34,12 +37,14 @@ Array = npt.NDArray[np.float64]
 class Simulation:
     """A motion of a scene under given torques.
 
-    scene: the simulated scene. lagrangian: K - V. flow: the discrete motion.
+    scene: the simulated scene. lagrangian: K - V. flow: the discrete motion. turns: full turns of
+    continuous joints at the start.
     """
 
     scene: Scene
     lagrangian: CasadiLagrangian
     flow: Flow
+    turns: Mapping[str, int] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         """Robot, duration and grid, for a terminal."""
@@ -107,7 +112,8 @@ class Simulation:
         z = regularized(self.scene.robot, grid, q, v, turned)
         path = DiscretePath(q.copy(), v, z, np.zeros((N, 0, n)))
         momenta = np.stack([self.momenta, np.zeros_like(v)], axis=1)
-        return Trajectory(grid, path, momenta, self.scene, {"status": "simulated"})
+        status = {"status": "simulated"}
+        return Trajectory(grid, path, momenta, self.scene, status, turns=self.turns)
 
 
 @check_arguments
@@ -145,10 +151,12 @@ def simulate(
         ld = SchemeLagrangian(forced, table, h)
     else:
         ld = ChartedLagrangian(forced, free.space, table, h)
-    q, v = as_state(start, scene.robot, "start").on(scene.robot, "start")
+    state = as_state(start, scene.robot, "start")
+    q, v = state.on(scene.robot, "start")
     warn_of_degrees(scene.robot, [q])
     x, p = legendre(free, q, v)
-    return Simulation(scene, free, flow(ld, x, p, intervals, force=True))
+    motion = flow(ld, x, p, intervals, force=True)
+    return Simulation(scene, free, motion, state.turns_made(scene.robot))
 
 
 def _drive(torque: Torque | Trajectory | Drive | None) -> Drive | None:

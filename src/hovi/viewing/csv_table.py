@@ -26,7 +26,8 @@ def write_csv(trajectory: Trajectory, path: str | os.PathLike[str], rate: float 
     """Write t, q, v, a and tau as comma-separated values in full precision, SI units.
 
     The first line names the columns: t, then q_, v_, a_ and tau_ with the coordinate's name; a
-    continuous joint's q has the columns [cos] and [sin], a quaternion's [qx] to [qw]. Rows are
+    continuous joint's q has the columns [cos] and [sin], a quaternion's [qx] to [qw]. The last
+    columns, angle_ with a name, are angles of continuous joints with their full turns. Rows are
     1/rate apart; the last is at exactly T, where the limits from the left are taken (from the
     right elsewhere).
 
@@ -40,7 +41,8 @@ def write_csv(trajectory: Trajectory, path: str | os.PathLike[str], rate: float 
         with whole_file(path) as stream:
             stream.write(_header(trajectory).encode())
             for t, sample in _batches(trajectory, times):
-                table = np.column_stack([t, *sample])
+                angles = trajectory.positions(t)[:, angle_indices(trajectory)]
+                table = np.column_stack([t, *sample, angles])
                 lines = (",".join(map(repr, row)) for row in table.tolist())
                 stream.write("".join(line + "\n" for line in lines).encode())
     except OSError as error:
@@ -72,12 +74,19 @@ def q_names(trajectory: Trajectory) -> list[str]:
 
 
 def column_names(trajectory: Trajectory) -> list[str]:
-    """Names of the columns t, q, v, a and tau: the kind and the coordinate, as in q_elbow."""
+    """Names of the columns t, q, v, a, tau and angle: the kind and the joint, as in q_elbow."""
     columns = ["t", *(f"q_{name}" for name in q_names(trajectory))]
     names, stored = trajectory.coordinate_names, trajectory.torque
     without = stored is not None and stored.values.shape[2] == 0  # of a Lagrangian without torques
     kinds = ("v", "a") if without else ("v", "a", "tau")
-    return columns + [f"{kind}_{name}" for kind in kinds for name in names]
+    columns += [f"{kind}_{name}" for kind in kinds for name in names]
+    return columns + [f"angle_{names[i]}" for i in angle_indices(trajectory)]
+
+
+def angle_indices(trajectory: Trajectory) -> list[int]:
+    """Indices in v of the continuous joints."""
+    space = trajectory.space
+    return [] if space is None else [factor.v.start for factor in space.angles]
 
 
 def _header(trajectory: Trajectory) -> str:

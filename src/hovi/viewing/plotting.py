@@ -30,12 +30,12 @@ from hovi.planning.problem.limits import KINDS, Limits
 from hovi.planning.solver.solver import Solution
 from hovi.robot.model import frame_named
 from hovi.robot.robot import Robot
+from hovi.robot.space.unwrapped_angles import shown_names
 from hovi.system.dataclass import dataclass
 from hovi.viewing.curves.colors import COLORS
 from hovi.viewing.curves.joint_panels import compared, joint_figure
 from hovi.viewing.curves.scheme_torque import scheme_torque
 from hovi.viewing.curves.shown_figure import ShownFigure
-from hovi.viewing.curves.unwrapped_angles import shown_names, unwrapped
 from hovi.viewing.distance_panel import draw_distances
 from hovi.viewing.figures import align_zeros, draw_cautions, write_figure
 from hovi.viewing.limit_bands import Curve, draw_limits, legend_entries
@@ -59,6 +59,7 @@ class _SampledMotion:
     """A motion sampled at m points in each of N intervals, ends included."""
 
     t: Array  # (N, m)
+    positions: Array  # (N, m, nv)
     motion: Sample  # arrays (N, m, n)
     limits: Limits | None
     active: Mask  # (N, m, 4, nv), True where a limit is active
@@ -130,8 +131,7 @@ def motion_figure(trajectory: Trajectory) -> Figure:
     panels = 3 if kept is None else 4
     figure = ShownFigure(figsize=(8.0, 2.5 * panels), layout="constrained")
     axes = figure.subplots(panels, sharex=True)
-    q = _coordinates(trajectory, curve.motion.q)
-    values = (q, curve.motion.v, curve.motion.tau)
+    values = (curve.positions, curve.motion.v, curve.motion.tau)
     for ax, panel, y in zip(axes[:3], (_POSITION, _VELOCITY, _EFFORT), values, strict=True):
         _draw(ax, trajectory, panel, curve, y)
     if kept is not None:
@@ -147,7 +147,7 @@ def angles_figure(trajectory: Trajectory) -> Figure:
     curve = _sampled_motion(trajectory)
     figure = Figure(figsize=(7.0, 4.0), layout="constrained")
     ax = figure.subplots()
-    _draw(ax, trajectory, _POSITION, curve, _coordinates(trajectory, curve.motion.q))
+    _draw(ax, trajectory, _POSITION, curve, curve.positions)
     ax.set_xlabel("time [s]")
     _legend(figure, ax, _names(trajectory))
     return figure
@@ -223,15 +223,8 @@ def _axes_in_world(robot: Robot) -> Array:
     return axes[:, [column for each in columns for column in each]]
 
 
-def _coordinates(trajectory: Trajectory, q: Array) -> Array:
-    """Configurations (N, S, nq) as nv numbers each: angles unwrapped, rotation vectors."""
-    if trajectory.space is None:
-        return q
-    return unwrapped(trajectory.space, q.reshape(-1, q.shape[-1])).reshape(*q.shape[:2], -1)
-
-
 def _names(trajectory: Trajectory) -> tuple[str, ...]:
-    """Names of the columns of `_coordinates`."""
+    """Names of the columns of `Trajectory.positions`."""
     names = trajectory.coordinate_names
     return names if trajectory.space is None else shown_names(trajectory.space, names)
 
@@ -252,7 +245,8 @@ def _chain(robot: Robot, q: Array) -> Array:
 def _sampled_motion(trajectory: Trajectory) -> _SampledMotion:
     N = trajectory.grid.intervals
     s = np.linspace(0.0, 1.0, max(3, -(-_CURVE_POINTS // N) + 1))
-    motion = trajectory.sample_intervals(np.repeat(np.arange(N), len(s)), np.tile(s, N))
+    where = np.repeat(np.arange(N), len(s)), np.tile(s, N)
+    motion = trajectory.sample_intervals(*where)
     t = trajectory.t[:-1, None] + trajectory.grid.steps[:, None] * s
     tau = scheme_torque(trajectory, t.ravel())
     motion = motion if tau is None else motion._replace(tau=tau)
@@ -260,7 +254,9 @@ def _sampled_motion(trajectory: Trajectory) -> _SampledMotion:
     active: Mask = np.zeros((N, len(s), 4, motion.v.shape[1]), dtype=bool)
     if limits is not None:
         active = at_limit(limits, motion, trajectory.robot).reshape(active.shape)
-    return _SampledMotion(t, Sample(*(x.reshape(N, len(s), -1) for x in motion)), limits, active)
+    q = trajectory.positions_intervals(*where).reshape(N, len(s), -1)
+    motion = Sample(*(x.reshape(N, len(s), -1) for x in motion))
+    return _SampledMotion(t, q, motion, limits, active)
 
 
 def _draw(ax: Axes, trajectory: Trajectory, panel: _Panel, curve: _SampledMotion, y: Array) -> None:

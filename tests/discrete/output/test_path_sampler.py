@@ -14,7 +14,7 @@ import pytest
 import hovi
 from hovi.discrete.grid import DiscretePath, Grid
 from hovi.discrete.output.path_sampler import PathSampler
-from hovi.discrete.stored_torque import StoredTorque
+from hovi.discrete.output.stored_torque import StoredTorque
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError
 from hovi.scene.segment_scenes import SegmentScenes

@@ -149,7 +149,7 @@ def test_a_plan_of_another_robot_is_refused(planned: Trajectory, ur5: Robot, sim
 
 
 def test_a_plan_without_a_scene_is_executed_open_loop(simple: Scene, planned: Trajectory) -> None:
-    from hovi.discrete.stored_torque import StoredTorque
+    from hovi.discrete.output.stored_torque import StoredTorque
 
     stored = StoredTorque.fit(
         lambda k, s: planned.sample_intervals(k, s).tau, planned.grid.intervals

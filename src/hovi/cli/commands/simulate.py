@@ -125,6 +125,7 @@ def _report(task: Task, motion: Simulation, out: Path | None) -> dict[str, Any]:
         "intervals": len(motion.t) - 1,
         "order": motion.order,
         "q": motion.q[-1].tolist(),
+        "positions": motion.trajectory.positions(float(motion.t[-1]))[0].tolist(),
         "v": motion.v[-1].tolist(),
         "energy": float(energy[0]),
         "energy_end": float(energy[-1]),

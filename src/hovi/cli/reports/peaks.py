@@ -6,8 +6,8 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.discrete.trajectory import Trajectory
+from hovi.robot.space.unwrapped_angles import shown_names
 from hovi.system.dataclass import dataclass
-from hovi.viewing.curves.unwrapped_angles import shown_names, unwrapped
 
 Array = npt.NDArray[np.float64]
 
@@ -22,7 +22,7 @@ class Peaks:
 
     names: of the coordinates. shown: their display names, see `shown_names`.
     q_low, q_high: range of q, in [rad] or [m]; angles of continuous joints and orientations as in
-        `unwrapped`.
+        `Trajectory.positions`.
     v, a, tau: largest |v|, |a| and |tau|.
     lower, upper, v_limit, tau_limit: limits of the URDF; infinite where it has none.
     """
@@ -54,9 +54,9 @@ def peaks(trajectory: Trajectory) -> Peaks:
     N = trajectory.grid.intervals
     per_interval = max(1, min(SAMPLES_PER_INTERVAL, MAX_SAMPLES // N))
     s = np.linspace(0.0, 1.0, per_interval + 1)
-    motion = trajectory.sample_intervals(np.repeat(np.arange(N), len(s)), np.tile(s, N))
+    where = np.repeat(np.arange(N), len(s)), np.tile(s, N)
+    motion, q = trajectory.sample_intervals(*where), trajectory.positions_intervals(*where)
     nv, space = motion.v.shape[1], trajectory.space
-    q = motion.q if space is None else unwrapped(space, motion.q)
     lower, upper = np.full(nv, -np.inf), np.full(nv, np.inf)
     robot = trajectory.robot
     v_limit, tau_limit = np.full(nv, np.inf), np.full(nv, np.inf)

@@ -8,8 +8,8 @@ import numpy as np
 
 from hovi.cli.reports.terminal_table import print_table
 from hovi.planning.problem.limits import urdf_limits
+from hovi.robot.space.unwrapped_angles import shown_names
 from hovi.system.dataclass import dataclass
-from hovi.viewing.curves.unwrapped_angles import shown_names, unwrapped
 
 if TYPE_CHECKING:
     from hovi.flows.simulator import Simulation
@@ -53,10 +53,11 @@ def limits_sentence(exceeded: list[ExceededLimit]) -> str:
 
 
 def end_state(motion: Simulation) -> list[dict[str, Any]]:
-    """One row per coordinate: joint, q, v and unit at the end, with q as in `unwrapped`."""
+    """One row per coordinate: joint, q, v and unit at the end, with q as in `positions`."""
     robot = motion.scene.robot
     names = shown_names(robot.space, robot.coordinate_names)
-    rows = zip(names, unwrapped(robot.space, motion.q)[-1], motion.v[-1], strict=True)
+    positions = motion.trajectory.positions(float(motion.t[-1]))[0]
+    rows = zip(names, positions, motion.v[-1], strict=True)
     return [
         {"joint": name, "q": q, "v": v, "unit": units.q}
         for (name, q, v), units in zip(rows, robot.coordinate_units, strict=True)

@@ -82,6 +82,9 @@ def _end(goal: State | FrameGoal, name: str, robot: Robot) -> list[str]:
         return [f"{name}: frame {goal.frame!r}", *_frame_parts(goal)]
     q, v = goal.on(robot, name)
     lines = [f"{name} q = {_numbers(q)}", f"{name} v = {_numbers(v)}"]
+    angles = goal.angles_on(robot)
+    for i in np.flatnonzero(~np.isnan(angles)):
+        lines.append(f"{name} angle of {robot.coordinate_names[i]} = {angles[i]:g} rad")
     if goal.a is not None:
         lines.append(f"{name} a = {_numbers(np.asarray(goal.a, dtype=float))}")
     for key in ("free", "free_velocity", "free_acceleration"):

@@ -8,7 +8,7 @@ from dataclasses import field
 import numpy as np
 import numpy.typing as npt
 
-from hovi.discrete.stored_torque import chebyshev_points
+from hovi.discrete.output.stored_torque import chebyshev_points
 from hovi.discrete.trajectory import Sample, Trajectory
 from hovi.errors import InputError
 from hovi.robot.frame_distance import FrameDistance

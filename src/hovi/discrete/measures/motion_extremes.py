@@ -9,7 +9,7 @@ import numpy.typing as npt
 from numpy.polynomial import chebyshev
 
 from hovi.checks.arguments import check_arguments
-from hovi.discrete.stored_torque import chebyshev_points
+from hovi.discrete.output.stored_torque import chebyshev_points
 from hovi.discrete.trajectory import Trajectory
 from hovi.robot.space.coordinates import NO_UNITS
 from hovi.robot.space.joint_kinds import Units

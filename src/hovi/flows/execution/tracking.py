@@ -15,6 +15,7 @@ from hovi.errors import InputError, expect
 from hovi.flows.execution.controllers import Controller, controller
 from hovi.flows.simulator import Simulation, simulate
 from hovi.robot.frame_distance import FrameDistance
+from hovi.robot.space.joint_table import with_angles
 from hovi.scene.scene import Scene
 from hovi.system.dataclass import dataclass
 
@@ -100,7 +101,8 @@ def play(
         )
     drive = controller(plan, feedback, scene, bandwidth)
     count = intervals or steps_on_nodes(plan)
-    start = State(plan.q[0], plan.v[0])
+    angles = plan.positions(0.0)[0]
+    start = State(with_angles(plan.q[0], angles, scene.robot), plan.v[0])
     motion = simulate(scene, start, plan.duration, drive, intervals=count, inner_modes=inner_modes)
     return Tracking(plan, motion, drive)
 

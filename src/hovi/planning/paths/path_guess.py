@@ -60,11 +60,12 @@ def path_guesses(
         return
     stops = [*_stops(problem, direct.q[0]), (problem.grid.duration, direct.q[-1])]
     t = np.array([0.0, *(time for time, _ in stops)])
+    turns = [*np.zeros((len(stops) - 1, len(space.speed))), _full_turns(problem) / space.speed]
     with OmplProcess() as ompl:
         for k in range(count):
             legs, x = list[Array](), np.zeros(len(space.speed))
-            for (_, q), duration in zip(stops, np.diff(t), strict=True):
-                y = x + space.x_between(space.q(x[None])[0], q)
+            for (_, q), turn, duration in zip(stops, turns, np.diff(t), strict=True):
+                y = x + space.x_between(space.q(x[None])[0], q) + turn
                 seeds = range(seed * 1_009 + k, (seed + 1) * 1_009, count)
                 points = fast_path(ompl, space, (x, y), seeds[:DRAWS], float(duration))
                 if points is None:
@@ -72,6 +73,14 @@ def path_guesses(
                 legs, x = [*legs, points], y
             pieces = [motion_along(space, *leg) for leg in zip(legs, np.diff(t), strict=True)]
             yield problem.path(joined(pieces, t[:-1]))
+
+
+def _full_turns(problem: TrajectoryProblem) -> Array:
+    """Full turns of continuous joints beyond the shortest path, (nv,), in [rad]."""
+    angles = [factor.v.start for factor in problem.coordinates.space.angles]
+    full = np.zeros(problem.coordinates.nv)
+    full[angles] = 2 * np.pi * problem.turns[angles]
+    return full
 
 
 def fast_path(

@@ -16,9 +16,9 @@ from hovi.checks.arguments import check_arguments
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import DiscretePath, Grid
 from hovi.discrete.guess import Boundary, Curve, moved, named_curve, path_on_grid, with_turns
+from hovi.discrete.output.stored_torque import StoredTorque
 from hovi.discrete.path_of_any_order import moved_any, path_of_any_order, polynomial, with_fixed
 from hovi.discrete.state import Periodic, State
-from hovi.discrete.stored_torque import StoredTorque
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError
 from hovi.planning.clearance.clearance import Clearance
@@ -32,6 +32,7 @@ from hovi.planning.problem.limits import Limits, no_limits
 from hovi.planning.problem.node_conditions import NodeCondition
 from hovi.planning.problem.notation.summaries import ProblemSummary
 from hovi.planning.problem.notation.supported import require_dynamics, require_supported
+from hovi.planning.problem.notation.whole_turns import turns_to
 from hovi.planning.problem.seams import Hold, ViaPoints, curve_through, holding
 from hovi.planning.problem.torque_moments import TorqueMoments
 from hovi.planning.problem.way_back.end_state import EndState
@@ -156,7 +157,8 @@ class TrajectoryProblem(ProblemSummary):
             object.__setattr__(self, "end_jets", tuple(map(np.stack, zip(*jets, strict=True))))
         object.__setattr__(self, "boundary", (*at_start, *goal.on(coordinates, "goal")))
         object.__setattr__(self, "free_ends", np.stack(free))
-        object.__setattr__(self, "turns", goal.turns_on(coordinates, "goal"))
+        stops = [self.boundary[0], *(each.q for each in self.holds), self.boundary[2]]
+        object.__setattr__(self, "turns", turns_to(goal, start, coordinates, stops))
 
     @classmethod
     def of_segments(
@@ -224,8 +226,7 @@ class TrajectoryProblem(ProblemSummary):
             problem._set_conditions(start, goal)
         else:
             problem = dataclasses.replace(self, start=start, goal=goal)
-        same_ends = np.array_equal(problem.free_ends, self.free_ends)
-        if same_ends and problem.periodic == self.periodic:
+        if problem.periodic == self.periodic and np.array_equal(problem.free_ends, self.free_ends):
             object.__setattr__(problem, "structure", self.structure)
         return problem
 
@@ -276,16 +277,17 @@ class TrajectoryProblem(ProblemSummary):
 
     def motion(self, path: DiscretePath, momenta: Array, metadata: dict[str, Any]) -> Trajectory:
         """A path on the grid as a trajectory; arguments as for Trajectory."""
+        turns = self.start.turns_made(self.coordinates)
         if self.ld.segments is not None and self.about_robot:
             segments = SegmentScenes(self.scenes, tuple(np.bincount(self.ld.segments).tolist()))
-            return Trajectory(self.grid, path, momenta, None, metadata, segments=segments)
+            return Trajectory(self.grid, path, momenta, None, metadata, None, segments, turns)
         if self.about_robot:
-            return Trajectory(self.grid, path, momenta, self.scene, metadata)
+            return Trajectory(self.grid, path, momenta, self.scene, metadata, turns=turns)
         metadata = {**metadata, "coordinates": list(self.coordinates.coordinate_names)}
         if self.coordinates.curved_space is not None:
             metadata["space"] = list(self.coordinates.space.parts)
         none = StoredTorque.none(self.grid.intervals)
-        return Trajectory(self.grid, path, momenta, None, metadata, none)
+        return Trajectory(self.grid, path, momenta, None, metadata, none, turns=turns)
 
     def ends(self, q: Array, v: Array) -> Boundary:
         """The boundary data, with free components from the ends of q (M, nq) and v (M, nv)."""

@@ -16,6 +16,7 @@ from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.inverse_kinematics import first_configuration, position_bounds
 from hovi.robot.loading import with_locked
 from hovi.robot.robot import Robot
+from hovi.robot.space.joint_table import with_angles
 from hovi.scene.scene import Scene
 
 Array = npt.NDArray[np.float64]
@@ -41,6 +42,9 @@ def in_group(
         return scene, start, goal
     q = _whole(robot, start)
     angles = robot.difference(robot.neutral(), q)
+    if isinstance(start, State):
+        given = start.angles_on(robot)
+        angles = np.where(np.isnan(given), angles, given)
     held = tuple((joint, float(angles[robot.entries_of(joint)][0])) for joint in others)
     for joint in others:
         part = robot.entries_of(joint)
@@ -109,7 +113,8 @@ def _end(end: State | FrameGoal, robot: Robot, smaller: Robot) -> State | FrameG
         )
         for key in ("free", "free_velocity", "free_acceleration", "free_jerk")
     }
-    return dataclasses.replace(end, q=np.asarray(end.q, dtype=float)[kept_q], **changed, **free)
+    q, angles = end.on(robot, "an end")[0][kept_q], end.angles_on(robot)[kept_v]
+    return dataclasses.replace(end, q=with_angles(q, angles, smaller), **changed, **free)
 
 
 def _entries(robot: Robot, smaller: Robot, size: str) -> list[int]:

@@ -19,9 +19,11 @@ import numpy.typing as npt
 
 from hovi.discrete.grid import DiscretePath
 from hovi.discrete.guess import Curve, stretched, with_bump, with_turns
+from hovi.discrete.state import State
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import ChartError
 from hovi.planning.paths.first_guesses import FirstGuesses
+from hovi.planning.problem.notation.whole_turns import says_turns
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.search.free_duration import FreeDuration
 from hovi.planning.search.job import Job
@@ -325,7 +327,10 @@ def _round(
         base = stretched(bases[i % len(bases)], T, problem.ld.k)
         curve = with_bump(base, robot, T, seed=seed * 100_003 + i)
         if robot.space.angles:
-            curve = with_turns(curve, robot, T, _random_turns(robot, seed * 100_003 + i))
+            turns = _random_turns(robot, seed * 100_003 + i)
+            if isinstance(problem.goal, State):
+                turns[says_turns(problem.goal, robot)] = 0.0
+            curve = with_turns(curve, robot, T, turns)
         guesses.append(_on_charts(problem, curve, base))
     return guesses
 

@@ -8,6 +8,8 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, ParamSpec, Protocol, cast
 
+import numpy as np
+
 from hovi.checks.arguments import check_arguments_except
 from hovi.discrete.output.caution import COLLISION, LEFT_OUT, STATUS, WARNED, Caution
 from hovi.discrete.state import State, warn_of_degrees
@@ -20,6 +22,7 @@ from hovi.planning.problem.goals import Via
 from hovi.planning.problem.notation.ends import End, as_end
 from hovi.planning.problem.notation.objective import with_objective
 from hovi.planning.problem.notation.smoothing import smoothed
+from hovi.planning.problem.notation.whole_turns import says_turns
 from hovi.planning.problem.presolve.assumptions import assumptions
 from hovi.planning.problem.presolve.findings import findings
 from hovi.planning.problem.presolve.length_slips import grasped_slips
@@ -382,4 +385,6 @@ def warn_of_ends(
     given = [start, *(via.goal for via in stops), goal]
     states = [each for each in given if isinstance(each, State)]
     if LOOKS_LIKE_DEGREES not in reason:
-        warn_of_degrees(robot, [state.on(robot, "state")[0] for state in states])
+        said = says_turns(goal, robot) if isinstance(goal, State) else False
+        angles = [np.where(said, state.angles_on(robot), np.nan) for state in states]
+        warn_of_degrees(robot, [state.on(robot, "state")[0] for state in states], angles)

@@ -40,7 +40,6 @@ from hovi.planning.solver.receding.braking import BRAKES, braking
 from hovi.planning.solver.receding.ends import (
     as_goal,
     as_start,
-    first_state,
     inside_limits,
     is_near,
     measured,
@@ -214,7 +213,7 @@ class Solution(SolutionSummary):
         length = None if duration is None else seconds(duration, "the duration")
         shift = Shift.of(old, seconds(elapsed, "the time elapsed"), length)
         path = shift.path(self.trajectory.path)
-        state = first_state(path)
+        state = shift.first_state(path, self.trajectory)
         if start is not None:
             state = measured(start, old, state)
         to = old.goal if goal is None else as_goal(goal, old)

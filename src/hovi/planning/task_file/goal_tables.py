@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,7 +21,7 @@ from hovi.planning.search.group import with_others
 from hovi.planning.task_file.messages import Keys, TomlText, spelled
 from hovi.planning.task_file.schema import EndTable, ViaTable
 from hovi.robot.robot import Robot
-from hovi.robot.space.joint_table import JointError
+from hovi.robot.space.joint_table import JointError, configuration_of, with_angles
 
 _FREE = ("free", "free_velocity", "free_acceleration")
 
@@ -51,6 +52,8 @@ def read_end(
             chosen.check(robot)
             return chosen
         state = chosen.resolved(robot, name)
+        if isinstance(state.q, Mapping) and not state.turns_made(robot):  # q says all
+            state = replace(state, q=state.on(robot, name)[0])
     except EndError as wrong:
         raise toml.error((*keys, *_key(wrong.key)), str(wrong)) from None
     except JointError as wrong:
@@ -77,10 +80,11 @@ def _key(name: str | None) -> Keys:
 def _check_state(state: State, keys: Keys, robot: Robot, toml: TomlText) -> None:
     """Raise SceneError, with the line, for a state that does not fit the robot."""
     name = spelled(keys)
-    given: dict[str, Any] = {key: getattr(state, key) for key in ("q", "v", "a")}
+    q = configuration_of(state.q, robot, f"{name}.q")
+    given: dict[str, Any] = {key: getattr(state, key) for key in ("v", "a")}
     rates = {key: np.zeros(robot.nv) if given[key] is None else given[key] for key in ("v", "a")}
     for key, check in (
-        ("q", lambda: robot.check_configuration(given["q"], f"{name}.q")),
+        ("q", lambda: robot.check_configuration(q, f"{name}.q")),
         ("v", lambda: robot.check_velocity(rates["v"], f"{name}.v")),
         ("a", lambda: robot.check_velocity(rates["a"], f"{name}.a")),
         ("free", lambda: state.free_on(robot, name, 3)),
@@ -150,7 +154,8 @@ def state_table(state: State, robot: Robot, name: str) -> dict[str, Any]:
     """The table of a state; a velocity and an acceleration of zero are left out."""
     state = state.resolved(robot, name)
     q, v = state.on(robot, name)
-    table: dict[str, Any] = {"q": _floats(q)}
+    turned = with_angles(q, state.angles_on(robot), robot)
+    table: dict[str, Any] = {"q": turned if isinstance(turned, dict) else _floats(q)}
     if np.any(v):
         table["v"] = _floats(v)
     if state.a is not None and np.any(np.asarray(state.a)):

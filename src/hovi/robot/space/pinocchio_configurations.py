@@ -116,6 +116,8 @@ def manifold_hint(model: pin.Model) -> str:
     for (nq, nv), names in kinds.items():
         held = _CONTENTS.get((nq, nv), f"{nq} numbers for {nv} degrees of freedom")
         parts.append(f"{', '.join(names)} {'takes' if len(names) == 1 else 'take'} {nq}: {held}")
+    if kinds.keys() == {(2, 1)}:
+        parts.append(f"or one number for each joint, {model.nv} in all, with its angle")
     return f"; {'; '.join(parts)}" if parts else ""
 
 

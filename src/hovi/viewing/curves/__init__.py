@@ -1,1 +1,1 @@
-"""Curves over time as numbers: torques of a scheme, and angles without jumps."""
+"""Curves over time as numbers: torques of a scheme, and panels of the joints."""

@@ -15,7 +15,6 @@ from hovi.planning.solver.solver import Solution
 from hovi.viewing.curves.colors import COLORS
 from hovi.viewing.curves.given_motion import motion_in
 from hovi.viewing.curves.shown_figure import ShownFigure
-from hovi.viewing.curves.unwrapped_angles import unwrapped
 
 Array = npt.NDArray[np.float64]
 
@@ -79,8 +78,8 @@ def joint_figure(
 
 def _values(motion: Trajectory) -> tuple[Array, Array, Array]:
     """Positions, velocities and efforts, (M, nv) each."""
-    sample = motion.sample(np.linspace(0.0, motion.duration, _SAMPLES))
-    q = sample.q if motion.space is None else unwrapped(motion.space, sample.q)
+    times = np.linspace(0.0, motion.duration, _SAMPLES)
+    sample, q = motion.sample(times), motion.positions(times)
     tau = sample.tau if sample.tau.shape == sample.v.shape else np.full_like(sample.v, np.nan)
     return q, sample.v, tau
 

@@ -20,10 +20,10 @@ from hovi.errors import InputError
 from hovi.planning.problem.limits import KINDS, Limits
 from hovi.robot.model import frame_id
 from hovi.robot.robot import Robot
+from hovi.robot.space.unwrapped_angles import shown_names
 from hovi.system.dataclass import dataclass
 from hovi.viewing.curves.colors import COLORS
 from hovi.viewing.curves.scheme_torque import scheme_torque
-from hovi.viewing.curves.unwrapped_angles import shown_names, unwrapped
 
 Array = npt.NDArray[np.float64]
 
@@ -57,8 +57,7 @@ class Curves:
             motion = trajectory.sample(t)
         except InputError:
             return None
-        space, torque = trajectory.space, scheme_torque(trajectory, t)
-        q = motion.q if space is None else unwrapped(space, motion.q)
+        q, torque = trajectory.positions(t), scheme_torque(trajectory, t)
         tau = motion.tau if torque is None else torque
         return cls(trajectory.duration, q.T, motion.v.T, tau.T)
 

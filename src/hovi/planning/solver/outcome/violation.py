@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from hovi.discrete.state import State
 from hovi.discrete.trajectory import Trajectory
 from hovi.planning.clearance.clearance_violation import (
     approach_along,
@@ -12,6 +13,7 @@ from hovi.planning.clearance.clearance_violation import (
 )
 from hovi.planning.problem.limit_violation import excess_of, worst_sentence
 from hovi.planning.problem.limits import Limits
+from hovi.planning.problem.notation.whole_turns import turns_missed
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.augmented_lagrangian_rounds import (
@@ -32,7 +34,7 @@ def violation_of(problem: TrajectoryProblem, motion: Trajectory) -> str:
     Raises OutOfTimeError when the deadline in force passes before that is known.
     """
     path = motion.path
-    missed = misses(problem, path)
+    missed = misses(problem, path) or _turns_missed(problem, motion)
     if missed:
         return f"the motion {missed}"
     if problem.unreachable:
@@ -52,6 +54,14 @@ def violation_of(problem: TrajectoryProblem, motion: Trajectory) -> str:
         return ""
     near = problem.distances.restricted(pairs.tolist())
     return approach_sentence(motion, near, approach_along(motion, near, margin), margin)
+
+
+def _turns_missed(problem: TrajectoryProblem, motion: Trajectory) -> str:
+    """By how many full turns the motion ends away from its goal, as a clause; "" if by none."""
+    goal, on = problem.goal, problem.coordinates
+    if not isinstance(goal, State) or not on.space.angles:
+        return ""
+    return turns_missed(goal, on, motion.positions(motion.duration)[0])
 
 
 def _exceeded(motion: Trajectory, limits: Limits) -> bool:

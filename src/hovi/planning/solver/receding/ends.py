@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from hovi.discrete.grid import DiscretePath
 from hovi.discrete.state import Periodic, State
@@ -21,6 +22,11 @@ from hovi.planning.problem.inverse_kinematics import (
 )
 from hovi.planning.problem.notation.ends import End, as_end
 from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.robot.space.coordinates import Coordinates
+from hovi.robot.space.joint_table import with_angles
+from hovi.robot.space.turns import nearest_angles
+
+Array = npt.NDArray[np.float64]
 
 NEAR_DISTANCE, NEAR_ANGLE = 0.1, 0.5
 """Distance in [m] and angle in [rad] from a frame goal up to which `replan` keeps the old end."""
@@ -99,6 +105,7 @@ def first_state(path: DiscretePath) -> State:
 def measured(given: End, problem: TrajectoryProblem, passed: State) -> State:
     """The state measured where a motion passes one; with its acceleration if none is given.
 
+    Continuous joints that are measured without full turns have those nearest to the motion's.
     Warns of one that is given without a velocity, which means at rest, where the motion is not.
     Raises as `as_start` does.
     """
@@ -109,7 +116,20 @@ def measured(given: End, problem: TrajectoryProblem, passed: State) -> State:
             f"the state is given without a velocity, that is at rest, where the motion passes at "
             f"up to {fastest:.3g} per second: give hovi.State(q, v)."
         )
+    start = turned(start, problem.coordinates, passed.angles_on(problem.coordinates))
     return start if start.a is not None else dataclasses.replace(start, a=passed.a)
+
+
+def turned(state: State, on: Coordinates, near: Array) -> State:
+    """The state with angles of continuous joints; where q is (cos, sin), the nearest to others.
+
+    near: the others, shape (nv,), in [rad].
+    """
+    if not on.space.angles:
+        return state
+    q, given = state.on(on, "start")[0], state.angles_on(on)
+    angles = np.where(np.isnan(given), nearest_angles(q, near, on.space), given)
+    return dataclasses.replace(state, q=with_angles(q, angles, on))
 
 
 def inside_limits(state: State, problem: TrajectoryProblem) -> State:

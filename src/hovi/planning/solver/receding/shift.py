@@ -16,11 +16,13 @@ from hovi.discrete.grid import DiscretePath, Grid
 from hovi.discrete.guess import path_on_grid
 from hovi.discrete.path_of_any_order import path_of_any_order
 from hovi.discrete.state import State
+from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.goals import Via
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.central_path import CentralPath
+from hovi.planning.solver.receding.ends import first_state, turned
 from hovi.planning.solver.receding.remainder import Array, Index, Remainder
 from hovi.system.dataclass import dataclass
 
@@ -97,6 +99,11 @@ class Shift:
             return path_of_any_order(curve, self.grid, ends[:k], on)
         q, v, _ = ends
         return path_on_grid(curve, self.grid, (q[0], v[0], q[1], v[1]), on)
+
+    def first_state(self, path: DiscretePath, motion: Trajectory) -> State:
+        """The state in which the rest of a path starts, with the full turns of a whole motion."""
+        passed = motion.positions(self.elapsed)[0]
+        return turned(first_state(path), self.problem.coordinates, passed)
 
     def central(self, central: CentralPath) -> CentralPath | None:
         """The central path of the rest: paths, rows, bounds and multipliers follow.
