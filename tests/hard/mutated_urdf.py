@@ -21,9 +21,11 @@ import pinocchio as pin
 
 from hard.mutated_bytes import mutated_bytes
 from hard.verdict import Mutant, Verdict, judge
+from hovi.cli.reports.findings import findings_of
 from hovi.errors import HoviError
 from hovi.robot.bundled_models import example
 from hovi.robot.example_robots import example_robot
+from hovi.robot.findings.finding import COMMAND_LINE, PYTHON, SRDF
 from hovi.robot.loading import load_robot
 from hovi.robot.robot import Robot
 
@@ -77,7 +79,18 @@ def error_in(robot: Robot) -> str:
     assert robot.source.urdf is not None
     robot.describe()
     text = ElementTree.fromstring(robot.source.urdf)
-    return _number_error(robot, text) or _mass_matrix_error(robot)
+    return _number_error(robot, text) or _mass_matrix_error(robot) or _line_error(robot, text)
+
+
+def _line_error(robot: Robot, text: Element) -> str:
+    """Lines that would mend the file are elements, and have a place in it."""
+    for line in (line for found in findings_of(robot) for line in found.lines):
+        if line.where in (SRDF, PYTHON, COMMAND_LINE):
+            continue
+        ElementTree.fromstring(line.text)
+        if text.find(line.where) is None:
+            return f"there is no {line.where} for {line.text}"
+    return ""
 
 
 def _number_error(robot: Robot, text: Element) -> str:

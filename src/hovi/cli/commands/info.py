@@ -58,7 +58,7 @@ def info(
     if json and not check:
         raise InputError("--json is for --check: hovi info ROBOT --check --json.")
     if check and (what is None or what.lower().endswith(".npz")):
-        raise InputError("--check is about a robot: give its file or name, or a scene.")
+        raise InputError("what will hurt is asked of a robot: give its file or name, or a scene.")
     if what is None:
         print(_listed("robots of example-robot-data", robots))
         print(_listed("scenes that ship with hovi", scenes))

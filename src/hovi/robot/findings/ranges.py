@@ -7,11 +7,12 @@ from collections.abc import Iterator
 import numpy as np
 
 from hovi.errors import some_of
-from hovi.robot.findings.finding import Finding, Line, Severity
+from hovi.robot.findings.finding import PYTHON, Finding, Line, Severity
 from hovi.robot.findings.limit_lines import limit_line
 from hovi.robot.findings.subject import Subject
 from hovi.robot.space.angle_ranges import ranges_in_degrees, which_in_degrees
 from hovi.robot.space.joint_kinds import ANGLE, LENGTH, kind_of
+from hovi.robot.urdf.safety_controllers import soft_ranges
 
 LONG = 50.0
 """A range of a sliding joint, in [m], from which it looks like millimetres."""
@@ -68,16 +69,12 @@ def millimetres(subject: Subject) -> Iterator[Finding]:
 
 def soft_limits(subject: Subject) -> Iterator[Finding]:
     """Safety controllers, whose ranges are used where they are asked for."""
-    names = tuple(
-        name
-        for name, joint in subject.elements.items()
-        if joint.find("safety_controller") is not None
-    )
+    names = () if subject.urdf is None else tuple(soft_ranges(subject.urdf, subject.single))
     if names:
         yield Finding(
             Severity.NOTE,
             "soft-limits",
             names,
             f'safety controllers at {some_of(names)}: limits = "soft" has their ranges',
-            (Line("Python", 'limits="soft"'),),
+            (Line(PYTHON, 'limits="soft"'),),
         )

@@ -109,4 +109,5 @@ def _gyration(inertia: pin.Inertia) -> float:
     """The largest radius of gyration about the center of mass, in [m]; 0 without mass."""
     if inertia.mass <= 0.0:
         return 0.0
-    return float(np.sqrt(max(np.linalg.eigvalsh(inertia.inertia)[-1], 0.0) / inertia.mass))
+    largest = max(float(np.linalg.eigvalsh(inertia.inertia)[-1]), 0.0)
+    return float(np.sqrt(largest) / np.sqrt(inertia.mass))

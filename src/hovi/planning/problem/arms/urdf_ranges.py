@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
-from xml.etree.ElementTree import Element
+from collections.abc import Collection
 
 import numpy as np
 import numpy.typing as npt
@@ -11,9 +10,9 @@ import numpy.typing as npt
 from hovi.errors import InputError, some_of
 from hovi.robot.robot import Robot
 from hovi.robot.urdf.check import checked_urdf
+from hovi.robot.urdf.safety_controllers import Range, soft_ranges
 
 Array = npt.NDArray[np.float64]
-Range = tuple[float, float]
 
 
 def require_ranges(robot: Robot, others: Collection[int] = ()) -> None:
@@ -57,30 +56,14 @@ def _stated(robot: Robot) -> dict[int, Range]:
 
 
 def _soft_ranges(robot: Robot) -> dict[int, Range]:
-    """The ranges of safety controllers that lie inside those of the joints, by index in v.
-
-    Of joints with one position. A controller whose soft limits are both zero,
-    which is what URDF takes for missing ones, has none. Raises InputError where there is none.
-    """
-    given, found = _stated(robot), dict[int, Range]()
-    numbers = {name: i for i, name in enumerate(robot.coordinate_names)}
-    for joint in _joints(robot):
-        controller, i = joint.find("safety_controller"), numbers.get(joint.get("name", ""), -1)
-        if controller is None or i not in given:
-            continue
-        keys = "soft_lower_limit", "soft_upper_limit"
-        soft = [float(controller.get(key, "0")) for key in keys]
-        lower, upper = max(soft[0], given[i][0]), min(soft[1], given[i][1])
-        if any(soft) and lower < upper:
-            found[i] = (float(lower), float(upper))
+    """The ranges of safety controllers by index in v. Raises InputError where there is none."""
+    stated, found = _stated(robot), dict[str, Range]()
+    if robot.source.urdf is not None:
+        urdf = checked_urdf(robot.source.urdf, robot.source.reference)
+        found = soft_ranges(urdf, {robot.coordinate_names[i]: x for i, x in stated.items()})
     if not found:
         raise InputError(
             f"the URDF of robot {robot.name!r} has no <safety_controller> with soft limits: use "
             'limits = "urdf".'
         )
-    return found
-
-
-def _joints(robot: Robot) -> Iterator[Element]:
-    if robot.source.urdf is not None:
-        yield from checked_urdf(robot.source.urdf, robot.source.reference).iterfind("joint")
+    return {i: found[x] for i in stated if (x := robot.coordinate_names[i]) in found}
