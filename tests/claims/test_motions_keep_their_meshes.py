@@ -274,3 +274,30 @@ def rewrite(source: Path, target: Path, old: str, new: str) -> None:
     del header["sha256"]
     entries["header"] = np.frombuffer(json.dumps(header).encode(), np.uint8)
     np.savez(target, **entries)
+
+
+def test_a_motion_in_segments_brings_its_meshes_once(tmp_path: Path) -> None:
+    urdf = mesh_package(tmp_path)
+    scene = hovi.Scene(hovi.load_robot(urdf), effects=[hovi.effects.Gravity(9.81)])
+    load = hovi.effects.Payload(frame="l6", mass=0.5)
+    segments = [hovi.Segment(GOAL, 1.5), hovi.Segment(START, 1.5, effects=[load])]
+    motion = hovi.plan_sequence(scene, START, segments, limits="urdf").trajectory
+    motion.save(tmp_path / "motion.npz")
+    before = page(motion, tmp_path)
+    shutil.rmtree(tmp_path / PACKAGE)
+    assert page(hovi.Trajectory.load(tmp_path / "motion.npz"), tmp_path) == before
+    with np.load(tmp_path / "motion.npz") as arrays:
+        assert len([name for name in arrays.files if name.startswith("mesh-")]) == len(FILES) - 2
+
+
+def test_workers_and_grippers_take_the_meshes_along(folder: Path, moved: hovi.Trajectory) -> None:
+    """A robot that holds something, or comes back from a worker process, is drawn by them, too."""
+    assert moved.robot is not None
+    ball = hovi.Grasped(hovi.Sphere([0.0, 0.0, 0.3], 0.03), "l6", mass=0.2, name="ball")
+    held = hovi.holding(moved.robot, ball)
+    assert held.visual_problem == held.collision_problem == ""
+    found = hovi.plan(
+        moved.scene, START, GOAL, 1.5, limits="none", self_collision=False, starts=2, processes=2
+    ).trajectory
+    assert found.robot is not None
+    assert found.robot.visual_problem == ""

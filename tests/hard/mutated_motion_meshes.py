@@ -55,10 +55,10 @@ def mutate(random: Random) -> Mutant:
     if random.random() < 0.2:
         return Mutant(mutated_bytes(original(), random, TOKENS))
     entries = unpacked(original())
-    change = random.choice((*_CHANGES, *_INVALIDATING_CHANGES))
+    change = random.choice((*_CHANGES, *INVALIDATING_CHANGES))
     change(entries, random)
     rehash(entries, random)
-    reason = (change.__doc__ or "").split("\n")[0] if change in _INVALIDATING_CHANGES else ""
+    reason = (change.__doc__ or "").split("\n")[0] if change in INVALIDATING_CHANGES else ""
     return Mutant(packed(entries, random), reason)
 
 
@@ -148,12 +148,17 @@ def _other_content(entries: Entries, random: Random) -> None:
     """Another content with its own hash, as whoever writes the file can have it."""
     name = random.choice(_meshes(entries))
     content = mutated_bytes(zlib.decompress(_content(entries, name)), random, (b"nan", b"9" * 99))
+    replace(entries, name, hashlib.sha256(content).hexdigest(), zlib.compress(content))
+
+
+def replace(entries: Entries, name: str, sha256: str, content: bytes) -> None:
+    """Put another mesh into the place of one. content: compressed."""
     del entries[name]
-    old, new = name.removeprefix(PREFIX), hashlib.sha256(content).hexdigest()
-    _put(entries, PREFIX + new, zlib.compress(content))
+    _put(entries, PREFIX + sha256, content)
+    old = name.removeprefix(PREFIX)
 
     def change(header: dict[str, Any]) -> None:
-        header["meshes"] = json.loads(json.dumps(header["meshes"]).replace(old, new))
+        header["meshes"] = json.loads(json.dumps(header["meshes"]).replace(old, sha256))
 
     edit(entries, change)
 
@@ -186,12 +191,14 @@ def _cut(entries: Entries, random: Random) -> None:
 
 def _bomb(entries: Entries, random: Random) -> None:
     """a mesh is larger than all that a motion may bring"""
-    _put(entries, random.choice(_meshes(entries)), _large())
+    replace(entries, random.choice(_meshes(entries)), *_large())
 
 
 @cache
-def _large() -> bytes:
-    return zlib.compress(bytes(BOMB), 1)
+def _large() -> tuple[str, bytes]:
+    """The hash of a content, and the content compressed."""
+    content = bytes(BOMB)
+    return hashlib.sha256(content).hexdigest(), zlib.compress(content, 1)
 
 
 def _too_large(entries: Entries, random: Random) -> None:
@@ -215,13 +222,23 @@ def _numbers(entries: Entries, random: Random) -> None:
 def _many(entries: Entries, random: Random) -> None:
     """there are more meshes than a motion may have"""
     hashes = [hashlib.sha256(str(i).encode()).hexdigest() for i in range(5_001)]
-    names = {each: {"sha256": each, "textures": {}} for each in hashes}
-    if random.random() < 0.5:
-        edit(entries, lambda header: header["meshes"].update(kept=hashes))
-    else:
-        edit(entries, lambda header: _table(header).update(names))
+    edit(entries, lambda header: header["meshes"].update(kept=hashes))
 
 
-_INVALIDATING_CHANGES: tuple[Callable[[Entries, Random], None], ...] = (
-    *(_swapped, _cut, _bomb, _too_large, _removed, _numbers, _many),
-)
+def _many_names(entries: Entries, random: Random) -> None:
+    """there are more names of meshes than a motion may have"""
+    mesh = {"sha256": "0" * 64, "textures": {}}
+    edit(entries, lambda header: _table(header).update({str(i): mesh for i in range(5_001)}))
+
+
+INVALIDATING_CHANGES: dict[Callable[[Entries, Random], None], str] = {
+    _swapped: "does not have its sha256",
+    _cut: "is not complete",
+    _bomb: "its meshes take more than 256 MB",
+    _too_large: "more than 20000000",
+    _removed: "lacks the entry 'mesh-",
+    _numbers: "expected uint8 in C order",
+    _many: "no list of at most 5,000 hashes",
+    _many_names: "it names more than 5,000 meshes",
+}
+"""With a part of the sentence that refuses the file."""
