@@ -28,7 +28,7 @@ class FirstGuesses:
     """A direct guess, how deep in obstacles it is, in [m], and guesses along paths around them.
 
     further: draws other paths, where there are any. branches: guesses to other configurations at
-    the goal.
+    the goal. isolated: whether these, and that of the direct guess, are free to move nowhere.
     """
 
     direct: DiscretePath
@@ -36,6 +36,7 @@ class FirstGuesses:
     paths: tuple[DiscretePath, ...] = ()
     further: Callable[[], Sequence[DiscretePath]] = tuple
     branches: tuple[DiscretePath, ...] = ()
+    isolated: bool = False
 
     @property
     def all(self) -> tuple[DiscretePath, ...]:

@@ -29,6 +29,12 @@ from hovi.system.dataclass import dataclass
 Array = npt.NDArray[np.float64]
 
 
+MET = 1e-6
+"""Largest distance [m] and angle [rad] by which a configuration that meets a goal misses it."""
+FULL_RANK = 1e-6
+"""Least singular value of a goal's equations, relative to all, in an isolated configuration."""
+
+
 @check_arguments_except("time", "goal")
 @dataclass(frozen=True, eq=False)
 class Via:
@@ -109,6 +115,25 @@ def goal_state(
         f"{hint_on_frame(coordinates, goal) or advice}"
     )
     return GoalState(state, (condition,), reason)
+
+
+def held_goal(goal: FrameGoal, robot: Robot, q: Array, free: Sequence[str] = ()) -> State | None:
+    """A goal of a frame as the state that meets it at q, (nq,); None if it does not.
+
+    free: joints that are free there where they do not move the frame.
+    """
+    if max(goal.miss(robot, q)) > MET:
+        return None
+    moves = moves_frame(robot.model, goal.frame)
+    left = tuple(each for each in free if each == ALL or not moves[robot.entries_of(each)].any())
+    return None if ALL in left else State(q, free=left, free_velocity=tuple(goal.free_velocity))
+
+
+def is_isolated(goal: FrameGoal, robot: Robot, q: Array) -> bool:
+    """Whether no other configurations beside q, (nq,), meet a goal: its Jacobian has full rank."""
+    moves = moves_frame(robot.model, goal.frame)
+    J = _condition(robot, goal).evaluate(q, np.zeros(robot.nv))[1][:, 0, moves]
+    return bool(np.linalg.matrix_rank(J, tol=FULL_RANK * np.linalg.norm(J)) == moves.sum())
 
 
 def _moving_joints(robot: Robot, frame: str, free: tuple[str, ...]) -> tuple[str, ...]:

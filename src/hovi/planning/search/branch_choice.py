@@ -11,7 +11,8 @@ each of these motions is free to move.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator
+import operator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -35,6 +36,7 @@ from hovi.planning.problem.notation.supported import LIMITED_ORDERS
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.search.job import Job
 from hovi.planning.search.options import PlanOptions
+from hovi.planning.solver.initial_path import guess_path
 from hovi.planning.solver.solver import Solution, solve_on_grid
 from hovi.planning.solver.status import Status
 from hovi.scene.scene import Scene
@@ -44,8 +46,9 @@ from hovi.system.deadline import Deadline, OutOfTimeError
 
 Array = npt.NDArray[np.float64]
 
-SOLVED = 16
-"""Largest number of pairs of ends between which a motion is solved for."""
+SKETCHED, SOLVED = 64, 16
+"""Largest numbers of pairs of ends between which a rough motion is looked for, and of the cheapest
+among them, for which one is solved for."""
 TURNED = 4
 """Largest number of pairs with full turns among them."""
 ROUGH, FROM_ROUGH = 3, 6
@@ -66,16 +69,43 @@ class Ends:
     """The ends of a plan: the branches between which the motion is the cheapest, and others.
 
     start, goal: of the plan; a goal of a frame has the branch as its guess.
-    compared: number of pairs of branches that were compared. motion: between the ends, on a few
-        intervals; None where nothing was compared. others: motions from the same start to other
-        branches, the cheapest first.
+    motions: between pairs of branches, on a few intervals, the cheapest first; none where nothing
+        was compared.
     """
 
     start: State
     goal: State | FrameGoal
-    compared: int = 1
-    motion: Trajectory | None = None
-    others: tuple[Trajectory, ...] = ()
+    motions: tuple[_Motion, ...] = ()
+    choice: _Choice | None = None
+
+    @property
+    def compared(self) -> int:
+        """Number of pairs of branches that were compared."""
+        return max(len(self.motions), 1)
+
+    @property
+    def found(self) -> tuple[Trajectory, ...]:
+        """The motions from the start, within the limits, the cheapest first."""
+        return tuple(each.found.trajectory for each in self._from_start if each.known)
+
+    @property
+    def _from_start(self) -> tuple[_Motion, ...]:
+        return tuple(each for each in self.motions if each.pair.start is self.start)
+
+    def cheaper_clear(self, cost: float, deadline: Deadline) -> Ends | None:
+        """The ends of the cheapest motion that keeps links apart and clear of obstacles.
+
+        cost: of the motion between these ends that does. deadline: of the whole plan.
+        None if none is found but between these ends, or dearer ones.
+        """
+        if self.choice is None:
+            return None
+        choice = dataclasses.replace(self.choice, deadline=deadline.part(SHARE))
+        known = [each for each in self._from_start if each.known]
+        best = choice.clear(known, cost)
+        if best is None or (best.pair is known[0].pair and best.found.cost >= cost):
+            return None
+        return choice.chosen((best,))
 
 
 def chosen_ends(
@@ -123,6 +153,24 @@ class _Pair:
 
 
 @dataclass(frozen=True, eq=False)
+class _Motion:
+    """A motion between a pair of ends, on a few intervals."""
+
+    pair: _Pair
+    found: Solution
+
+    @property
+    def known(self) -> bool:
+        """Whether there is one within the limits."""
+        return self.found.status not in _WITHOUT_MOTION
+
+    @property
+    def rank(self) -> tuple[bool, bool, float]:
+        """Whether none within the limits is found, or no minimum, and its cost."""
+        return not self.known, not self.found.success, self.found.cost
+
+
+@dataclass(frozen=True, eq=False)
 class _Choice:
     """A plan whose ends are to be chosen: see `chosen_ends`. deadline: of the choice."""
 
@@ -141,18 +189,41 @@ class _Choice:
         except UnreachableError:
             return Ends(starts[0], self.goal)
         known = self.scene.order in LIMITED_ORDERS and not self.scene.passive
-        solved = self._solved(pairs) if known and len(pairs) > 1 else []
+        solved = self._solved(pairs) if known and len(pairs) > 1 else ()
         if not solved:
             return Ends(pairs[0].start, self._goal_at(pairs[0].q))
-        (best, cheapest), *rest = solved
-        goal = self._goal_at(best.q)
-        motion, *others = [
-            None if found.status in _WITHOUT_MOTION else found.trajectory
-            for pair, found in [(best, cheapest), *rest]
-            if pair.start is best.start
-        ]
-        other_motions = tuple(other for other in others if other is not None)
-        return Ends(best.start, goal, len(solved), motion, other_motions)
+        return self.chosen(solved)
+
+    def chosen(self, motions: tuple[_Motion, ...]) -> Ends:
+        """The ends of the first of motions."""
+        best = motions[0].pair
+        return Ends(best.start, self._goal_at(best.q), motions, self)
+
+    def clear(self, motions: Sequence[_Motion], cost: float) -> _Motion | None:
+        """The cheapest of motions when they keep clear, if it is cheaper than the first of them.
+
+        motions: the cheapest first. They cost no less for keeping clear, so that dearer ones than
+        the best are not solved for. cost: known of the first, taken where it is not found here.
+        """
+        best = None
+        try:
+            with self.deadline.in_force():
+                for number, motion in enumerate(motions):
+                    if number > 0 and motion.found.cost >= cost:
+                        break
+                    clear = self._clear(motion)
+                    if clear.found.success and (number == 0 or clear.found.cost < cost):
+                        best, cost = clear, clear.found.cost
+        except (OutOfTimeError, HoviError):
+            pass
+        return best
+
+    def _clear(self, motion: _Motion) -> _Motion:
+        """A motion between the same ends that keeps clear."""
+        problem = self._problem(motion.pair, clear=True)
+        guess = guess_path(problem, motion.found.trajectory)
+        found = solve_on_grid(problem, guess, max_iterations=STEPS, barrier=LAST_BARRIER)
+        return _Motion(motion.pair, found)
 
     def starts(self) -> list[State]:
         """The states at which the motion may begin, the nearest to the goal first."""
@@ -166,7 +237,7 @@ class _Choice:
         """Configurations in which a frame meets its goal: that at the guess alone if it has one."""
         robot, options = self.scene.robot, self.options
         first = first_configuration(robot, goal, near if goal.guess is None else None, self._bounds)
-        found = configurations(robot, goal, first, self._bounds, options.clearance)
+        found = configurations(robot, goal, first, self._bounds, options.clearance, SKETCHED)
         return found if goal.guess is None else found[:1]
 
     def _pairs(self, start: State) -> list[_Pair]:
@@ -200,33 +271,34 @@ class _Choice:
             return goal
         return dataclasses.replace(goal, guess=q)
 
-    def _solved(self, pairs: list[_Pair]) -> list[tuple[_Pair, Solution]]:
+    def _solved(self, pairs: list[_Pair]) -> tuple[_Motion, ...]:
         """Motions between pairs of ends on a few intervals, the cheapest first.
 
         Those that are solved for until the deadline, one for each pair.
         """
-        found = dict[int, tuple[_Pair, Solution]]()
+        found = dict[int, _Motion]()
         try:
             with self.deadline.in_force():
                 for number, curve in self._guesses(pairs):
                     problem = self._problem(pairs[number])
                     guess = "cubic" if curve is None else problem.path(curve)
-                    motion = solve_on_grid(
+                    solution = solve_on_grid(
                         problem, guess, max_iterations=STEPS, barrier=LAST_BARRIER
                     )
-                    known = found.get(number)
-                    if known is None or _rank(motion) < _rank(known[1]):
-                        found[number] = pairs[number], motion
+                    motion, known = _Motion(pairs[number], solution), found.get(number)
+                    if known is None or motion.rank < known.rank:
+                        found[number] = motion
         except (OutOfTimeError, HoviError):
             pass
-        return sorted(found.values(), key=lambda each: _rank(each[1]))
+        return tuple(sorted(found.values(), key=_rank))
 
     def _guesses(self, pairs: list[_Pair]) -> Iterator[tuple[int, Curve | None]]:
         """Numbers of pairs and guesses, None for the cubic: those first that promise most."""
-        chosen, robot = self._promising(pairs), self.scene.robot
+        robot = self.scene.robot
         if not robot.space.flat or self.scene.terms.timed:
-            yield from ((number, None) for number in chosen)
+            yield from ((number, None) for number in self._promising(pairs, SOLVED))
             return
+        chosen = self._promising(pairs, SKETCHED)
         q0, q1 = self._configurations([pairs[i] for i in chosen])
         v0 = np.array([pairs[i].start.on(robot, "start")[1] for i in chosen])
         lagrangian = self.scene.effort_lagrangian(self.options.weight)
@@ -236,35 +308,38 @@ class _Choice:
             for seed in range(ROUGH)
         ]
         best = np.argmin([each.cost for each in rough], axis=0)
-        order = np.argsort([rough[b].cost[i] for i, b in enumerate(best)], kind="stable")
+        order = np.argsort([rough[b].cost[i] for i, b in enumerate(best)], kind="stable")[:SOLVED]
         for rank, i in enumerate(order):
             if rank < FROM_ROUGH:
                 yield chosen[i], rough[best[i]].curve(int(i))
         yield from ((chosen[i], None) for i in order)
 
-    def _promising(self, pairs: list[_Pair]) -> list[int]:
-        """Up to SOLVED pairs: the ones without further turns, and the cheapest cubics of others."""
+    def _promising(self, pairs: list[_Pair], most: int) -> list[int]:
+        """So many pairs: the ones without further turns, and the cheapest cubics of others."""
         lagrangian = self.scene.effort_lagrangian(self.options.weight)
         q0, q1 = self._configurations(pairs)
         cost = cubic_costs(lagrangian, self.scene.robot, q0, q1, self.duration)
         order = np.argsort(np.where(np.isfinite(cost), cost, np.inf), kind="stable")
         turned = [int(i) for i in order if pairs[i].turned][:TURNED]
         others = [int(i) for i in order if not pairs[i].turned]
-        return others[: SOLVED - len(turned)] + turned
+        return others[: most - len(turned)] + turned
 
     def _configurations(self, pairs: list[_Pair]) -> tuple[Array, Array]:
         """Those at both ends of pairs, (P, nq) each."""
         starts = [self._configuration(pair.start) for pair in pairs]
         return np.array(starts), np.array([pair.q for pair in pairs])
 
-    def _problem(self, pair: _Pair) -> TrajectoryProblem:
-        """The motion between two ends on a few intervals, within the limits."""
+    def _problem(self, pair: _Pair, clear: bool = False) -> TrajectoryProblem:
+        """The motion between two ends on a few intervals, within the limits.
+
+        clear: whether it keeps links apart and clear of obstacles.
+        """
         scheme = of_order(by_name("galerkin-2"), self.scene.order)
         grid = Grid.uniform(self.duration, INTERVALS, scheme)
         limits = as_limits(self.scene.robot, self.options.limits).first_kinds
-        options = self.options.with_changes(
-            via=(), obstacles=(), self_collision=False, limits=limits
-        )
+        options = self.options.with_changes(via=(), limits=limits)
+        if not clear:
+            options = options.with_changes(obstacles=(), self_collision=False)
         goal = self.goal
         if isinstance(goal, FrameGoal):
             goal = State(pair.q, free_velocity=tuple(goal.free_velocity))
@@ -274,6 +349,4 @@ class _Choice:
 _WITHOUT_MOTION = Status.INFEASIBLE, Status.DIVERGED
 
 
-def _rank(found: Solution) -> tuple[bool, bool, float]:
-    """Whether no motion within the limits is found, or no minimum, and the cost of the best one."""
-    return found.status in _WITHOUT_MOTION, not found.success, found.cost
+_rank = operator.attrgetter("rank")

@@ -8,6 +8,9 @@ from dataclasses import field
 from functools import cached_property, lru_cache
 from typing import Any, Self
 
+import numpy as np
+import numpy.typing as npt
+
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import Grid
 from hovi.discrete.state import State
@@ -15,7 +18,7 @@ from hovi.discrete.trajectory import Trajectory
 from hovi.effects import Effect
 from hovi.errors import ChartError
 from hovi.planning.problem.frame_goal import FrameGoal
-from hovi.planning.problem.goals import Via
+from hovi.planning.problem.goals import Via, held_goal, is_isolated
 from hovi.planning.problem.limits import Limits, as_limits
 from hovi.planning.problem.presolve.formulas_of_time import graded
 from hovi.planning.problem.problem import TrajectoryProblem
@@ -28,6 +31,8 @@ from hovi.scene.scene import Scene
 from hovi.scene.segmented_lagrangian import SegmentedLagrangian
 from hovi.schemes import is_galerkin, of_order
 from hovi.system.dataclass import dataclass
+
+Array = npt.NDArray[np.float64]
 
 MAX_GUESS_INTERVALS = 400
 """Largest number of intervals of a guess on whose grid a refinement begins."""
@@ -123,6 +128,27 @@ class Job:
     def with_options(self, **changes: Any) -> Self:
         """The job with some of its options changed."""
         return dataclasses.replace(self, options=self.options.with_changes(**changes))
+
+    def held_at(self, q: Array) -> State | None:
+        """The goal of a frame as the state that meets it at q, (nq,).
+
+        None for another kind of goal, a q that does not meet it, or where passive joints move.
+        """
+        if not isinstance(self.goal, FrameGoal) or self.scene.passive:
+            return None
+        return held_goal(self.goal, self.scene.robot, q, tuple(self.start.free))
+
+    @property
+    def isolated(self) -> bool:
+        """Whether the end of its motion may move nowhere from the goal's guess."""
+        goal = self.goal
+        if not isinstance(goal, FrameGoal) or goal.guess is None or self.scene.passive:
+            return False
+        return is_isolated(goal, self.scene.robot, np.asarray(goal.guess))
+
+    def to(self, goal: State | FrameGoal) -> Self:
+        """The job to another goal."""
+        return dataclasses.replace(self, goal=goal)
 
     def on(self, grid: Grid) -> Self:
         """The job on another grid."""

@@ -178,6 +178,7 @@ class Exploration:
     done: number of starts that were solved. interrupted: whether Ctrl-C ended the exploration.
     lost: why starts have no solution, as the process that solved them died, one reason for each.
     first: the guesses of the first starts. by_path: motions that began as one of their paths.
+    goal: where the end of the best one was held; None if that of the job.
     """
 
     minima: list[Solution]
@@ -186,6 +187,7 @@ class Exploration:
     lost: tuple[str, ...] = ()
     first: FirstGuesses | None = None
     by_path: tuple[Trajectory, ...] = ()
+    goal: State | None = None
 
     def guess_of(self, motion: Trajectory) -> str:
         """What a message says of the guess of a refined motion: that of the nearest minimum."""
@@ -249,11 +251,14 @@ def _from_path_or_direct(pool: Pool, first: FirstGuesses, progress: Progress) ->
     rows = bool(first.paths) and pool.free is None and takes_rows(pool.job.problem())
     tried, by_path, stopped = list[Solution](), list[Trajectory](), False
     closer = False  # whether a motion is worth more steps
-    for attempt in _attempts(first, rows):
+    goals = list[State | None]()  # where the ends of these motions are held
+    for attempt in _attempts(first, rows, pool.job):
         if tried:
             progress(attempt.text, 0.5)
+        goal = attempt.goal
+        solving = pool if goal is None else dataclasses.replace(pool, job=pool.job.to(goal))
         try:
-            found = pool.solve_all([attempt.guess], attempt.way)  # a single one in this process
+            found = solving.solve_all([attempt.guess], attempt.way)  # a single one in this process
         except KeyboardInterrupt:
             if not tried:
                 raise
@@ -262,12 +267,15 @@ def _from_path_or_direct(pool: Pool, first: FirstGuesses, progress: Progress) ->
             break
         solution, stopped = found.solutions[0], found.interrupted
         tried.append(solution)
+        goals.append(goal)
         by_path += [solution.trajectory] * attempt.by_path
         closer = closer or (attempt.way == "rows" and solution.status not in WITHOUT_MOTION)
         ended = solution.success or stopped or pool.deadline.passed
         if ended or (closer and len(tried) > 1):  # the direct guess is tried in any case
             break
-    return Exploration(distinct(tried), len(tried), stopped, (), first, tuple(by_path))
+    minima = distinct(tried)
+    held = next(at for each, at in zip(tried, goals, strict=True) if each is minima[0])
+    return Exploration(minima, len(tried), stopped, (), first, tuple(by_path), held)
 
 
 @dataclass(frozen=True, eq=False)
@@ -275,15 +283,33 @@ class _Attempt:
     """A solve from a guess.
 
     by_path: whether it is a path by OMPL. way: where distances are bounded. text: for the progress.
+    goal: where its end is held; None if that of the job.
     """
 
     guess: DiscretePath
     by_path: bool
     way: DistancesAt | None
     text: str
+    goal: State | None = None
 
 
-def _attempts(first: FirstGuesses, rows: bool) -> Iterator[_Attempt]:
+def _attempts(first: FirstGuesses, rows: bool, job: Job) -> Iterator[_Attempt]:
+    """Solves from the guesses, with the end held where it may move nowhere.
+
+    A solve whose end is free may slide along its equations and end without a motion, so that the
+    first branch is tried with its end held in any case.
+    """
+    for attempt in _free_attempts(first, rows):
+        to_branch = attempt.guess is first.all[0] and not attempt.by_path
+        goal = job.held_at(attempt.guess.q[-1]) if first.isolated or to_branch else None
+        if goal is None or not first.isolated:
+            yield attempt
+        if goal is not None:
+            text = attempt.text if first.isolated else "with the end held where the goal is met"
+            yield dataclasses.replace(attempt, goal=goal, text=text)
+
+
+def _free_attempts(first: FirstGuesses, rows: bool) -> Iterator[_Attempt]:
     """The first path, and the direct guess; with rows of distances, further paths after these.
 
     The last two attempts have distances at quadrature points instead, which takes far longer.

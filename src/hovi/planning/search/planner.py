@@ -29,7 +29,6 @@ from hovi.planning.problem.presolve.length_slips import grasped_slips
 from hovi.planning.problem.units import Duration, as_duration
 from hovi.planning.refinement.faults.cautions import keeping_warnings, with_cautions_of_motion
 from hovi.planning.search.branch_choice import Ends, chosen_ends, nearest_ends
-from hovi.planning.search.final_stages import on_grid_of
 from hovi.planning.search.free_duration import FreeDuration
 from hovi.planning.search.group import in_group, with_others
 from hovi.planning.search.job import Job, grid_of, split_for_charts
@@ -229,13 +228,13 @@ def _notes(found: Solution, scenes: Sequence[Scene], options: PlanOptions) -> It
 
 def run(search: Search, began: float) -> Solution:
     """The best solution of a search, with its times. began: of the plan, by the clock."""
-    problem = search.fine.problem()
+    for job in filter(None, (search.fine, search.without)):
+        job.problem()  # however little time is left
     started = time.perf_counter()
     with search.deadline.in_force():
         best, minima = search.run()
     return dataclasses.replace(
         best,
-        problem=best.problem or on_grid_of(problem, best),
         minima=minima,
         setup_seconds=started - began,
         solve_seconds=time.perf_counter() - started,

@@ -5,6 +5,8 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterator
 
+import numpy as np
+
 from hovi.discrete.grid import Grid
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError
@@ -76,16 +78,36 @@ class Search:
         except OutOfTimeError:
             why = "the time limit was reached before distances between links were looked at"
             return ended_early(best, Status.TIME_LIMIT, why), ()
-        return self._run() if whole is None else (whole, costs)
+        return self._over_branches() if whole is None else (whole, costs)
+
+    def _over_branches(self) -> tuple[Solution, tuple[float, ...]]:
+        """As `run`, with all distances: the better one of the chosen branch and another.
+
+        The branch was chosen by motions in which links may meet; the other one by motions in which
+        they do not.
+        """
+        best, costs = self._run()
+        ended = best.status in STOPPED or interrupted() or self.free is not None
+        if ended or self.ends is None:
+            return best, costs
+        cost = best.cost if best.success else np.inf
+        ends = self.ends.cheaper_clear(cost, self.deadline)
+        if ends is None:
+            return best, costs
+        self.progress("from another configuration at the goal", 0.9)
+        other = dataclasses.replace(self, ends=ends, fine=self.fine.to(ends.goal))
+        found, further = other._run()
+        return (found, further) if found.success and found.cost < cost else (best, costs)
 
     def _of_whole(self, free: Solution) -> Solution | None:
         """A solution without self-collision as one with; None if links come too near in it."""
         # Here, since a robot without collision shapes plans without these modules.
         from hovi.planning.solver.methods.active_pairs import with_clearance
 
-        clearance, problem = self.fine.problem().clearance, free.problem or self.fine.problem()
+        clearance = self.fine.problem().clearance
         assert clearance is not None
-        problem = with_clearance(on_grid_of(problem, free), clearance)
+        assert free.problem is not None
+        problem = with_clearance(on_grid_of(free.problem, free), clearance)
         kept, near = dataclasses.replace(free, problem=problem), 0
         ended = free.status in (*STOPPED, Status.INFEASIBLE) or interrupted()
         if not ended and problem.distances is not None:  # there are pairs, within reach
@@ -160,7 +182,15 @@ class Search:
         return fine, search._explored(search._coarse()).minima[0]
 
     def _finished(self, job: Job, explored: Exploration) -> tuple[Solution, tuple[float, ...]]:
-        """The best solution after all stages, and the costs of all minima."""
+        """The best solution after all stages, and the costs of all minima.
+
+        Where the exploration held the end in a state, that is the goal of all of them.
+        """
+        if (goal := explored.goal) is not None:
+            fine = self.fine.to(goal)
+            job = fine if job is self.fine else job.to(goal)
+            held = dataclasses.replace(self, fine=fine)
+            return held._finished(job, dataclasses.replace(explored, goal=None))
         found = explored.minima
         try:
             for better in self._stages(job, found):
@@ -172,6 +202,8 @@ class Search:
         except KeyboardInterrupt as stopped:
             found = _ended(found, stopped, "the motion was compared with one on a finer grid")
         best = self._with_ending(found[0], explored)
+        problem = best.problem or on_grid_of(self.fine.problem(), best)
+        best = dataclasses.replace(best, problem=problem)
         return best, tuple(s.cost for s in found if s.success)
 
     def _resolved(self, found: list[Solution]) -> list[Solution]:
@@ -267,12 +299,13 @@ class Search:
         if not isinstance(options.guess, str):
             return FirstGuesses(direct)
         given = options.starts, options.seed, deadline, self.progress
-        if self.ends is None or self.ends.motion is None:
+        known = () if self.ends is None else self.ends.found
+        if not known:
             return first_guesses(problem, direct, *given)
-        found = first_guesses(problem, guess_path(problem, self.ends.motion), *given)
-        others = [guess_path(problem, motion) for motion in self.ends.others]
+        best, *others = [guess_path(problem, motion) for motion in known]
+        found = first_guesses(problem, best, *given)
         branches = [direct, *others] if options.starts == 1 else [*others, direct]
-        return dataclasses.replace(found, branches=tuple(branches))
+        return dataclasses.replace(found, branches=tuple(branches), isolated=job.isolated)
 
     def _continued(self, job: Job, found: list[Solution]) -> list[Solution]:
         """The solutions, or the result of continuation if there is no minimum among them."""
