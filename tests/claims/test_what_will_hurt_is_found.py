@@ -108,6 +108,7 @@ FAULTS: dict[str, tuple[str, str, str, set[str]]] = {
         {"c"},
     ),
     "no-inertia": (INERTIAL_C, "", "stops", {"j3"}),
+    "point-mass": (INERTIA_C, INERTIA_C.replace("0.01", "0"), "hint", {"c"}),
     "no-inertial": (INERTIAL_B, "", "hint", {"b"}),
     "mesh-unit": ("", "", "misleads", {"a"}),
     "mesh": ("", "", "misleads", {"a"}),
@@ -215,6 +216,25 @@ def test_a_fault_is_found_and_its_line_mends_it(
     assert kind not in left
     assert code == 0
     assert set(left) <= {"always-touching"}  # of a whole robot in the air
+
+
+@pytest.mark.parametrize(
+    ("content", "kind", "said"),
+    [
+        (CUBE.replace("0.4\n", "0\n"), "collision-shape", "'a.off' has no convex hull"),
+        (CUBE.replace("OFF", "OF"), "mesh", "2 of 2 meshes cannot be used"),
+    ],
+)
+def test_a_mesh_that_is_there_and_no_shape_is_found(
+    content: str, kind: str, said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments = written(tmp_path, GOOD)
+    (tmp_path / "shapes" / "a.off").write_text(content)
+    code, found = checked(capsys, *arguments)
+    assert (code, found.keys()) == (0, {kind})
+    assert found[kind]["severity"] == "misleads"
+    assert said in found[kind]["sentence"]
+    assert found[kind]["lines"] == []
 
 
 @pytest.mark.parametrize("factor", [1e6, 1e9])

@@ -10,7 +10,13 @@ import pinocchio as pin
 
 from hovi.robot.findings.boxes import Bounds, ShapeBox, shape_boxes
 from hovi.robot.findings.finding import Finding, Severity
-from hovi.robot.findings.inertia import bare_links, impossible, light_joints, no_inertia
+from hovi.robot.findings.inertia import (
+    bare_links,
+    impossible,
+    light_joints,
+    no_inertia,
+    points,
+)
 from hovi.robot.findings.joints import no_joints, unsupported_joints
 from hovi.robot.findings.loops import loops
 from hovi.robot.findings.meshes import large_meshes, missing_meshes, no_shapes
@@ -56,6 +62,7 @@ NOTED: tuple[Finder, ...] = (
     loops,
     unknown_names,
     bare_links,
+    points,
     impossible,
 )
 """What is looked for wherever a robot is described."""

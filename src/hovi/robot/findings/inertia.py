@@ -66,6 +66,23 @@ def bare_links(subject: Subject) -> Iterator[Finding]:
             )
 
 
+def points(subject: Subject) -> Iterator[Finding]:
+    """Links with a mass and no inertia, with nothing fixed to them that has one."""
+    found = dict[str, int]()
+    for joint, links in subject.bodies.items():
+        body = subject.model.inertias[joint]
+        if joint and joint not in subject.massless and body.mass > 0.0 and not body.inertia.any():
+            found.update((x, joint) for x in links if tensor_of(subject.links[x]) is not None)
+    if found:
+        yield Finding(
+            Severity.HINT,
+            "point-mass",
+            tuple(found),
+            f"the inertia of {some_of(found)} is 0, as if the mass were in a point",
+            tuple(_inertial(subject, link, joint) for link, joint in found.items()),
+        )
+
+
 def impossible(subject: Subject) -> Iterator[Finding]:
     """Inertias that no body has: a principal one exceeds the sum of the others.
 
@@ -149,7 +166,7 @@ def _possible(link: str, tensor: Array | None) -> Line:
 
 
 def _inertial(subject: Subject, link: str, joint: int) -> Line:
-    """An example of a link's <inertial>: boxes around its shapes, of DENSITY.
+    """An example of a link's <inertial>: boxes around its shapes, of its mass or else of DENSITY.
 
     joint: that moves it, whose body has the size of a link without shapes.
     """
@@ -157,6 +174,10 @@ def _inertial(subject: Subject, link: str, joint: int) -> Line:
     kind = "collision" if any(x.kind == "collision" for x in boxes) else "visual"
     side = max(subject.sizes[joint] / 2, SMALL)
     mass, center, tensor = _solid([x for x in boxes if x.kind == kind], float(side))
+    stated = subject.links[link].find("inertial/mass")
+    if stated is not None and float(stated.get("value", "0")) > 0.0:
+        tensor *= float(stated.get("value", "0")) / mass
+        mass = float(stated.get("value", "0"))
     at = " ".join(f"{x:.4g}" for x in center)
     parts = element("origin", {"xyz": at}), element("mass", {"value": f"{mass:.4g}"})
     text = element("inertial", {}, *parts, inertia_text(tensor))
