@@ -235,7 +235,7 @@ def _models() -> list[Call]:
         own(robot(), "hint", "tipp", ("tip",)),
         own(robot(), "joint_at", 1),
         own(panda(), "pose", "default"),
-        call(hovi.Robot.from_dict, robot().to_dict(), package_dirs=()),
+        call(hovi.Robot.from_dict, robot().to_dict(), package_dirs=(), meshes={}),
         call(ConfigurationSpace, (2, "SO(2)")),
         own(ConfigurationSpace((2, "SE(3)")), "integrate", np.zeros((3, 9)), np.zeros((3, 8))),
         own(ConfigurationSpace((2, "SE(3)")), "difference", np.zeros((3, 9)), np.zeros((3, 9))),
@@ -278,7 +278,7 @@ def _scenes() -> list[Call]:
         own(scene(), "effort_lagrangian", weight=[1.0, 2.0], regular=True),
         own(scene(), "inverse_dynamics", *[np.zeros((3, 2))] * 3, np.zeros(3)),
         own(scene(), "without", "gravity"),
-        call(hovi.Scene.from_dict, scene().to_dict()),
+        call(hovi.Scene.from_dict, scene().to_dict(), package_dirs=(), meshes={}),
         call(hovi.effects.register, hovi.effects.Gravity),
     ]
 
@@ -843,7 +843,7 @@ def _studies() -> list[Call]:
         *made,
         own(study, "run", out, 1, scheduler=None, replace=False, progress=None),
         *(call(load, out) for load in (hovi.Study.load, hovi.Study.load_runs)),
-        call(hovi.Study.motion, out, study.cells.key(0)),
+        call(hovi.Study.motion, out, study.cells.key(0), package_dirs=()),
     ]
 
 
@@ -855,8 +855,8 @@ def _files() -> list[Call]:
     hovi.save_task(task, toml)
     return [
         own(task, "require_one_motion", "a test"),
-        own(trajectory, "save", npz),
-        call(hovi.Trajectory.load, npz),
+        own(trajectory, "save", npz, meshes=True),
+        call(hovi.Trajectory.load, npz, package_dirs=()),
         call(hovi.load_task, toml),
         call(hovi.save_task, task, toml),
         call(hovi.write_csv, trajectory, folder() / "motion.csv", rate=100.0),
