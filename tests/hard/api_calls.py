@@ -451,6 +451,7 @@ def _problems() -> list[Call]:
         build(hovi.Limits, lower=limits.lower, upper=limits.upper, tolerance=1e-6),
         call(hovi.Limits.from_dict, limits.to_dict()),
         call(hovi.as_limits, robot(), {"base": "none", "v": 1.0}, order=2),
+        call(hovi.as_limits, robot(), {"base": "urdf", "v": "50 %", "tau": ["5 %", 2.0]}, order=2),
         own(limits, "with_margin", 0.1),
         own(limits, "excess", np.zeros((3, 4, 2))),
         build(hovi.Limits, lower=-np.ones((6, 2)), upper=np.ones((6, 2)), tolerance=1e-6),

@@ -76,6 +76,11 @@ RATES = _row([0.1, 0.0], {"elbow": 0.1}, types="list table")
 SECONDS = _leaf(0.5, "500 ms", types="integer float text")
 VALUES = _row(0.5, [0.5, 0.1], {"elbow": 0.2}, types="integer float list table")
 BOUND = _row(5.0, [5.0, 9.0], {"elbow": 4.0}, types="integer float list table nonfinite")
+SHARE = _row(
+    *("50 %", {"elbow": "80 %"}, ["5e1 %", 9.0]),
+    types="integer float list table text nonfinite",
+    items="integer float text",
+)
 FORMULA = _leaf("t", 'q["elbow"]', 0.1, types="integer float text")
 POINTS = _row([[5.0, 0, 0], [6.0, 0, 0], [5.0, 1, 0], [5.0, 0, 1]], items="list", open_=True)
 PATH = {"times": _row([0.0, 1.0]), "positions": _row([[5.0, 0, 0], [6.0, 0, 0]], items="list")}
@@ -149,6 +154,7 @@ LIMITS = {
     "margin": _leaf(0.1, 0.0),
     "tolerance": _leaf(1e-6),
 }
+SHARES_OF_LIMITS = {"base": _leaf("urdf", types="text"), "v": SHARE, "tau": SHARE}
 GRASPED = {
     "frame": _leaf("forearm", types="text"),
     "mass": _leaf(0.5),
@@ -236,7 +242,7 @@ def _grammar(random: Random) -> dict[str, Any]:
         chosen[key] = OPTIONS[key]
     shape = random.choice(SHAPES)
     tables = {
-        "limits": LIMITS,
+        "limits": random.choice((LIMITS, SHARES_OF_LIMITS)),
         "obstacles": [random.choice(OBSTACLES) | {"name": _leaf("ball", types="text")}],
         "grasped": [GRASPED | {"shape": shape}],
         "via": [{"time": SECONDS, **random.choice((ends, framed))}],

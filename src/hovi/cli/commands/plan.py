@@ -38,7 +38,8 @@ def plan(
     limits: Annotated[
         str | None,
         typer.Option(
-            metavar="urdf|soft|none|ARM", help="Override the scene's; ARM such as panda, ur5e."
+            metavar="urdf|soft|none|ARM|{v = '50 %'}",
+            help="Override the scene's; ARM such as panda, ur5e; or a table as in a scene file.",
         ),
     ] = None,
     objective: Annotated[
@@ -104,8 +105,6 @@ def plan(
 def _options(flags: dict[str, Any]) -> dict[str, Any]:
     """The plan options given as flags. Raises InputError."""
     from hovi.cli.arguments.durations import positive_seconds
-    from hovi.errors import InputError, nearest
-    from hovi.planning.problem.arms.limit_set import NAMES
     from hovi.planning.search.option_fields import option_infos
     from hovi.planning.search.options import PlanOptions
 
@@ -115,10 +114,8 @@ def _options(flags: dict[str, Any]) -> dict[str, Any]:
     }
     if "time_limit" in given:
         given["time_limit"] = positive_seconds("--time-limit", given["time_limit"])
-    limits, names = given.get("limits", "none"), ("urdf", "soft", "none", *NAMES)
-    if limits not in names:
-        hint = nearest(limits, names)
-        raise InputError(f"--limits {limits!r}: {hint} Give other limits in the scene file.")
+    if "limits" in given:
+        given["limits"] = _limits(given["limits"])
     if "guess" in given:
         given["guess"] = _guess(given["guess"])
     return given | _tolerance_override(given)
@@ -148,6 +145,30 @@ def _task(scene: str, options: dict[str, Any], compile: bool) -> Task:
     if not compile:
         return task
     return dataclasses.replace(task, scene=dataclasses.replace(task.scene, compile=True))
+
+
+def _limits(given: str) -> str | dict[str, Any]:
+    """The name of limits, or their table in TOML. Raises InputError."""
+    import tomllib
+
+    from hovi.errors import InputError, nearest
+    from hovi.planning.problem.arms.limit_set import NAMES
+
+    names = "urdf", "soft", "none", *NAMES
+    if given in names:
+        return given
+    if not given.lstrip().startswith("{"):
+        raise InputError(
+            f"--limits {given!r}: {nearest(given, names)} Give other limits as a table such as "
+            "\"{v = '50 %'}\", or in the scene file."
+        )
+    try:
+        table = tomllib.loads(f"limits = {given.strip()}")
+    except (ValueError, RecursionError) as error:
+        raise InputError(
+            f"--limits {given!r} is no table in TOML, such as \"{{v = '50 %'}}\": {error}."
+        ) from None
+    return dict(table["limits"])
 
 
 def _guess(guess: str) -> str | Trajectory:

@@ -17,7 +17,7 @@ from hovi.errors import InputError, nearest, warn
 from hovi.planning.problem.arms.limit_set import KIND_NAMES, OF_ORDER_3, is_limit_set, limit_set
 from hovi.planning.problem.arms.limit_set import NAMES as ARMS
 from hovi.planning.problem.arms.urdf_ranges import position_ranges, require_ranges
-from hovi.planning.problem.notation.limit_entries import entries, number_in
+from hovi.planning.problem.notation.limit_entries import Base, entries, number_in
 from hovi.planning.problem.notation.summaries import LimitsSummary
 from hovi.planning.problem.way_back.excused import Excused, widening
 from hovi.robot.robot import Robot
@@ -310,12 +310,12 @@ def as_limits(
     limits: "urdf" (of a robot), "soft" (the same, with the soft limits of its safety controllers),
         "none", the name of an arm of `hovi.limit_sets`, a Limits, or a mapping with any of `base`
         (one of these names, "urdf" by default), `q`, `v`, `a`, `tau`, `jerk`, `torque_rate`,
-        `margin` and `tolerance`. A kind is a number or a list of numbers x for -x and x, a list of
-        pairs (lower, upper), or a mapping from joint names to either.
-    order: of the motion's Lagrangian. What an arm's set says of the jerk and the torque rate
-        applies from order 3 on.
-    Raises InputError for unknown keys or joints and for bounds that do not fit the
-    coordinates. Warns of ranges of angles that look like degrees.
+        `margin` and `tolerance`. A kind is a number x for -x and x, a text such as "50 %" for that
+        share of the base's limits (not of positions), a list of these or of pairs (lower, upper),
+        or a mapping from joint names to any of them.
+    order: of the motion. What an arm's set says of jerk and torque rate applies from order 3 on.
+    Raises InputError for unknown keys or joints and for bounds that do not fit the coordinates.
+    Warns of ranges of angles that look like degrees.
     """
     if isinstance(limits, Limits):
         return limits
@@ -334,10 +334,11 @@ def as_limits(
     base = _by_name(coordinates, limits.get("base", "urdf"), order, own)
     if not limits.keys().isdisjoint(OF_ORDER_3):
         base = _with_all_kinds(base)
-    lower, upper = base.lower.copy(), base.upper.copy()
-    for row, kind in enumerate(KINDS):
-        for i, (low, high) in entries(coordinates, kind, limits.get(kind, {})).items():
-            lower[row, i], upper[row, i] = low, high
+    lower, upper, name = base.lower.copy(), base.upper.copy(), limits.get("base", "urdf")
+    for row, kind in enumerate(base.kinds):
+        of = Base(name, base.lower[row], base.upper[row])
+        for i, pair in entries(coordinates, kind, limits.get(kind, {}), of).items():
+            lower[row, i], upper[row, i] = pair
     lower[lower < -UNBOUNDED], upper[upper > UNBOUNDED] = -np.inf, np.inf
     chosen = Limits(lower, upper, number_in(limits, "tolerance", TOLERANCE))
     return _warned_of_degrees(coordinates, chosen.with_margin(number_in(limits, "margin", 0.0)))

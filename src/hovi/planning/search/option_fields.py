@@ -100,10 +100,17 @@ ELSEWHERE = {
     "constraints": "conditions of your own along a motion are not supported, a stiff running cost "
     "comes near them: see docs/costs.md and docs/when_not.md",
     "contacts": "contacts are not planned for: see docs/when_not.md",
-    "velocity_scaling": 'give limits, such as limits={"v": ...} in rad/s',
-    "acceleration_scaling": 'give limits, such as limits={"a": ...} in rad/s^2',
+    **dict.fromkeys(
+        ("velocity_scaling", "max_velocity_scaling_factor"),
+        'give limits, such as limits={"v": "50 %"} of those of the robot, or numbers in rad/s',
+    ),
+    **dict.fromkeys(
+        ("acceleration_scaling", "max_acceleration_scaling_factor"),
+        'give limits, such as limits={"base": "panda", "a": "50 %"} of those that the maker of an '
+        "arm publishes, or numbers in rad/s^2",
+    ),
 }
-"""What to do instead of options that other planners have."""
+"""What to do instead of options that other planners have, in Python and in scene files."""
 
 
 def require_known(options: type, names: Iterable[str]) -> None:

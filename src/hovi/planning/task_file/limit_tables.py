@@ -37,7 +37,7 @@ def read_limits(
         raise first_sentence(invalid, LimitsTable, toml, above=keys) from None
     limits = {key: _by_joint(value, robot) for key, value in given.items()}
     for kind in KINDS:
-        _check_kind(keys, kind, limits.get(kind, {}), robot, toml)
+        _check_kind(keys, kind, limits, robot, toml)
     _check(keys, limits, robot, toml)
     return limits
 
@@ -67,13 +67,25 @@ def _by_joint(value: Any, robot: Robot) -> Any:
     return value
 
 
-def _check_kind(keys: Keys, kind: str, given: Any, robot: Robot, toml: TomlText) -> None:
+def _check_kind(
+    keys: Keys, kind: str, limits: Mapping[str, Any], robot: Robot, toml: TomlText
+) -> None:
     """Check a kind, joint by joint if joints are named, so that errors have their line."""
+    given = limits.get(kind, {})
     if isinstance(given, dict):
         for joint, bound in given.items():
-            _check((*keys, kind, joint), {"base": "none", kind: {joint: bound}}, robot, toml)
+            _check((*keys, kind, joint), _alone(limits, kind, {joint: bound}), robot, toml)
     else:
-        _check((*keys, kind), {"base": "none", kind: given}, robot, toml)
+        _check((*keys, kind), _alone(limits, kind, given), robot, toml)
+
+
+def _alone(limits: Mapping[str, Any], kind: str, given: Any) -> dict[str, Any]:
+    """Limits of a kind without others; shares need the base, and the positions that it may need."""
+    parts = list(given.values()) if isinstance(given, dict) else given
+    parts = parts if isinstance(parts, list) else [parts]
+    if kind == "q" or not any(isinstance(each, str) for each in parts):
+        return {"base": "none", kind: given}
+    return {key: limits[key] for key in ("base", "q") if key in limits} | {kind: given}
 
 
 def _check(keys: Keys, limits: str | Mapping[str, Any], robot: Robot, toml: TomlText) -> None:

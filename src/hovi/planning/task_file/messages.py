@@ -12,6 +12,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from hovi.errors import SceneError, nearest
+from hovi.planning.search.option_fields import ELSEWHERE
 from hovi.system.dataclass import dataclass
 
 Keys = tuple[str | int, ...]
@@ -85,6 +86,9 @@ def first_sentence(
     key = spelled(above + keys)
     kind = details["type"]
     if kind == "extra_forbidden":
+        advice = None if above + keys[:-1] else ELSEWHERE.get(str(keys[-1]))
+        if advice:
+            return toml.error(keys, f"there is no key `{key}`: {advice}")
         valid = _fields_of(_model_at(model, keys[:-1]))
         return toml.error(above + keys, f"unknown key `{key}`; {nearest(str(keys[-1]), valid)}")
     expected = _expected(model, keys, details)

@@ -50,19 +50,35 @@ Configuration = Annotated[
     Numbers | ByJoint | Annotated[str, Tag("<text>")], Discriminator(_kind_or_text)
 ]
 
-Bound = Annotated[
+Pair = Annotated[
     Annotated[float, Tag("<number>")] | Annotated[list[float], Tag("<list>")],
     Discriminator(_kind),
+]
+Positions = Annotated[
+    Annotated[float, Tag("<number>")]
+    | Annotated[list[Pair], Tag("<list>")]
+    | Annotated[dict[str, Pair], Tag("<table>")],
+    Discriminator(_kind),
+]
+_POSITIONS = (
+    "a positive number, a list with a positive number or a pair [lower, upper] for each joint, "
+    "or a table of joint names"
+)
+Share = Annotated[str, Field(pattern=r"^ *[0-9.]+([eE][+-]?[0-9]+)? *% *$"), Tag("<text>")]
+Bound = Annotated[
+    Annotated[float, Tag("<number>")] | Annotated[list[float], Tag("<list>")] | Share,
+    Discriminator(_kind_or_text),
 ]
 Bounds = Annotated[
     Annotated[float, Tag("<number>")]
     | Annotated[list[Bound], Tag("<list>")]
-    | Annotated[dict[str, Bound], Tag("<table>")],
-    Discriminator(_kind),
+    | Annotated[dict[str, Bound], Tag("<table>")]
+    | Share,
+    Discriminator(_kind_or_text),
 ]
 _BOUNDS = (
     "a positive number, a list with a positive number or a pair [lower, upper] for each joint, "
-    "or a table of joint names"
+    'a text such as "50 %" of the limits of the base, or a table of joint names'
 )
 
 
@@ -214,7 +230,7 @@ class LimitsTable(Table):
     base: LimitsName = Field(
         default="urdf", description='"urdf", "soft", "none" or the name of an arm, such as "panda"'
     )
-    q: Bounds | None = Field(default=None, description=_BOUNDS)
+    q: Positions | None = Field(default=None, description=_POSITIONS)
     v: Bounds | None = Field(default=None, description=_BOUNDS)
     a: Bounds | None = Field(default=None, description=_BOUNDS)
     tau: Bounds | None = Field(default=None, description=_BOUNDS)

@@ -3,14 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
-from hovi.checks.kinds import is_number
+from hovi.checks.kinds import is_number, shown
 from hovi.checks.shapes import numbers_of
 from hovi.errors import InputError
+from hovi.planning.problem.units import SHARES, number_and_unit
 from hovi.robot.space.coordinates import Coordinates
+
+
+class Base(NamedTuple):
+    """Bounds of a kind that a share is of: the name of the limits, and both bounds, (nv,)."""
+
+    name: Any
+    lower: npt.NDArray[np.float64]
+    upper: npt.NDArray[np.float64]
 
 
 def number_in(limits: Mapping[str, Any], key: str, default: float) -> float:
@@ -21,9 +31,14 @@ def number_in(limits: Mapping[str, Any], key: str, default: float) -> float:
     return float(value)
 
 
-def entries(coordinates: Coordinates, kind: str, given: Any) -> dict[int, tuple[float, float]]:
-    """Bounds by index in v, from any of the accepted forms."""
-    found = _pairs(coordinates, kind, given)
+def entries(
+    coordinates: Coordinates, kind: str, given: Any, base: Base | None = None
+) -> dict[int, tuple[float, float]]:
+    """Bounds by index in v, from any of the accepted forms.
+
+    base: what texts such as "50 %" are shares of; positions need none, as they take no shares.
+    """
+    found = _pairs(coordinates, kind, given, base)
     if kind == "q" and not coordinates.vector_joints:
         for i in found:
             if i not in coordinates.space.plain[1] and isinstance(given, Mapping):
@@ -35,7 +50,9 @@ def entries(coordinates: Coordinates, kind: str, given: Any) -> dict[int, tuple[
     return found
 
 
-def _pairs(coordinates: Coordinates, kind: str, given: Any) -> dict[int, tuple[float, float]]:
+def _pairs(
+    coordinates: Coordinates, kind: str, given: Any, base: Base | None
+) -> dict[int, tuple[float, float]]:
     names = coordinates.coordinate_names
     if isinstance(given, Mapping):
         for name in given:
@@ -44,14 +61,48 @@ def _pairs(coordinates: Coordinates, kind: str, given: Any) -> dict[int, tuple[f
                     f"limits.{kind}: {coordinates.owner} has no joint {name!r}: "
                     f"{coordinates.hint(str(name), names)}"
                 )
-        return {names.index(name): _pair(kind, name, value) for name, value in given.items()}
-    if is_number(given):
+        at = {names.index(name): value for name, value in given.items()}
+        return {i: _bounds(coordinates, kind, i, value, base) for i, value in at.items()}
+    if is_number(given) or isinstance(given, str):
         given = [given] * coordinates.nv
     if not isinstance(given, Sequence | np.ndarray) or len(given) != coordinates.nv:
         raise InputError(
             f"limits.{kind} must have one entry for each of {', '.join(names)}, got {given!r}."
         )
-    return {i: _pair(kind, names[i], value) for i, value in enumerate(given)}
+    return {i: _bounds(coordinates, kind, i, value, base) for i, value in enumerate(given)}
+
+
+def _bounds(
+    coordinates: Coordinates, kind: str, i: int, value: Any, base: Base | None
+) -> tuple[float, float]:
+    """The bounds of a coordinate: a pair, a number, or a share of those of the base."""
+    name = coordinates.coordinate_names[i]
+    if not isinstance(value, str):
+        return _pair(kind, name, value)
+    share = _share(kind, name, value)
+    if kind == "q" or base is None:
+        raise InputError(
+            f"limits.{kind} of {name!r} is {value!r}, and a range of positions has no share: give "
+            "a pair lower < upper, or a `margin`, which keeps clear of both ends of all ranges."
+        )
+    lower, upper = float(base.lower[i]), float(base.upper[i])
+    if np.isinf(lower) and np.isinf(upper):
+        raise InputError(
+            f"limits.{kind} of {name!r} is {value!r} of a limit, but {base.name!r} has none for "
+            "this joint: give a number, or a base that has one."
+        )
+    return share * lower, share * upper
+
+
+def _share(kind: str, name: str, text: str) -> float:
+    """The share that a text such as "50 %" says. Raises InputError."""
+    number, unit = number_and_unit(text) or (0.0, "")
+    if unit != "%" or not 0 < number <= 100:
+        raise InputError(
+            f"limits.{kind} of {name!r} must be a positive number, a pair lower < upper, or a text "
+            f"from above 0 % to 100 % of its limit, such as '50 %', got {shown(text)}."
+        )
+    return number * SHARES[unit]
 
 
 def _pair(kind: str, name: str, value: Any) -> tuple[float, float]:
