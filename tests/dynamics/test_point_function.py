@@ -112,6 +112,20 @@ def test_the_parts_of_a_batch_cover_it_once(points: int, monkeypatch: pytest.Mon
     assert all(part.stop - part.start <= CHUNK for part, _ in parts)
 
 
+@pytest.mark.parametrize("points", [1, 2, 5, 7])
+def test_no_more_threads_than_points_share_the_heaviest_function(
+    points: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A humanoid without analytic derivatives is heavy enough for several threads at one point."""
+    monkeypatch.setenv("OMP_NUM_THREADS", "4")
+    monkeypatch.setattr("hovi.dynamics.point_function.MIN_INSTRUCTIONS", 100)
+    function = PointFunction(heavy_function())
+    parts = list(function._parts(points))
+    assert max(threads for _, threads in parts) == min(4, points)
+    assert all(part.stop > part.start for part, _ in parts)
+    assert function(np.zeros((points, 3)))[0].shape == (points, 3)
+
+
 def test_concurrent_calls_are_independent() -> None:
     function = PointFunction(heavy_function())
     x = np.random.default_rng(0).normal(size=(40, 3))

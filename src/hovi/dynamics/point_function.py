@@ -91,8 +91,9 @@ class PointFunction:
         """(points of a call, number of threads that share them equally); a remainder runs alone."""
         for first in range(0, points, CHUNK):
             last = min(first + CHUNK, points)
-            threads = max(1, min(self._threads, (last - first) * self._cost // MIN_INSTRUCTIONS))
-            shared = last - (last - first) % threads
+            count = last - first
+            threads = max(1, min(self._threads, count, count * self._cost // MIN_INSTRUCTIONS))
+            shared = last - count % threads
             yield slice(first, shared), threads
             if shared < last:
                 yield slice(shared, last), 1
