@@ -223,13 +223,15 @@ def test_a_fault_is_found_and_its_line_mends_it(
     [
         (CUBE.replace("0.4\n", "0\n"), "collision-shape", "'a.off' has no convex hull"),
         (CUBE.replace("OFF", "OF"), "mesh", "2 of 2 meshes cannot be used"),
+        ("", "mesh", "was not found in"),
     ],
 )
 def test_a_mesh_that_is_there_and_no_shape_is_found(
     content: str, kind: str, said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     arguments = written(tmp_path, GOOD)
-    (tmp_path / "shapes" / "a.off").write_text(content)
+    mesh = tmp_path / "shapes" / "a.off"
+    mesh.write_text(content) if content else mesh.unlink()
     code, found = checked(capsys, *arguments)
     assert (code, found.keys()) == (0, {kind})
     assert found[kind]["severity"] == "misleads"

@@ -12,8 +12,10 @@ from hovi.robot.findings.boxes import Bounds, ShapeBox, shape_boxes
 from hovi.robot.findings.finding import Finding, Severity
 from hovi.robot.findings.inertia import (
     bare_links,
+    harmful,
     impossible,
     light_joints,
+    massless_links,
     no_inertia,
     points,
 )
@@ -71,6 +73,8 @@ CHECKED: tuple[Finder, ...] = (
     unsupported_joints,
     no_inertia,
     *NOTED,
+    harmful,
+    massless_links,
     large_meshes,
     no_shapes,
     tools_without_frame,

@@ -22,6 +22,7 @@ import pinocchio as pin
 
 from hovi.errors import ModelError
 from hovi.robot.example_robots import example_robot
+from hovi.robot.findings.meshes import NOWHERE
 from hovi.robot.formats.packages import holds_all_files, package_name
 from hovi.robot.meshes.mesh_shape import mesh_shape
 from hovi.robot.meshes.stored_meshes import Packing, StoredMesh, StoredMeshes, content_hash
@@ -306,5 +307,5 @@ def _short(filename: str) -> str:
 
 def _places(candidates: list[tuple[Path, Path]]) -> str:
     if not candidates:
-        return "any package folder; give package_dirs=[the folder of the package] or --package-dir"
+        return f"{NOWHERE}; give package_dirs=[the folder of the package] or --package-dir"
     return ", ".join(repr(str(root)) for root, _ in candidates)

@@ -42,7 +42,8 @@ def _collisions(robot: Robot) -> Iterator[Finding]:
 
     pairs: tuple[tuple[str, str], ...] = ()
     try:
-        pairs = touching_links(robot) if names_shapes(robot) else ()
+        given = robot.given[1] is not None and robot.given[1].ngeoms > 0
+        pairs = touching_links(robot) if given or names_shapes(robot) else ()
     except ModelError as problem:
         sentence = f"links are not kept apart: {str(problem).removesuffix('.')}"
         yield Finding(Severity.MISLEADS, "collision-shape", (), sentence)

@@ -48,22 +48,33 @@ def no_inertia(subject: Subject) -> Iterator[Finding]:
 
 
 def bare_links(subject: Subject) -> Iterator[Finding]:
-    """Links that move without <inertial>: a hint where others fixed to them have no mass either."""
-    found = {x.get("name", "") for x in subject.moving_links() if x.find("inertial") is None}
-    lumped, massless = dict[str, int](), dict[str, int]()
-    for joint, links in subject.bodies.items():
-        if joint not in subject.massless:
-            bare = {link: joint for link in links if link in found}
-            (lumped if subject.model.inertias[joint].mass > 0.0 else massless).update(bare)
-    for severity, names in ((Severity.HINT, massless), (Severity.NOTE, lumped)):
-        if names:
-            yield Finding(
-                severity,
-                "no-inertial",
-                tuple(names),
-                f"{some_of(names)}: moving without <inertial>, so without mass and inertia",
-                tuple(_inertial(subject, link, joint) for link, joint in names.items()),
-            )
+    """Links that move without <inertial>, whatever they are fixed to."""
+    if found := _bare(subject):
+        yield _without_inertial(Severity.NOTE, found, ())
+
+
+def massless_links(subject: Subject) -> Iterator[Finding]:
+    """Those fixed to nothing that has a mass, where links behind give the joint its inertia."""
+    bare = set(_bare(subject))
+    found = {
+        link: joint
+        for joint, links in subject.bodies.items()
+        for link in links
+        if joint not in subject.massless and not subject.model.inertias[joint].mass > 0.0
+        if link in bare
+    }
+    if found:
+        lines = tuple(_inertial(subject, link, joint) for link, joint in found.items())
+        yield _without_inertial(Severity.HINT, list(found), lines)
+
+
+def _bare(subject: Subject) -> list[str]:
+    return [x.get("name", "") for x in subject.moving_links() if x.find("inertial") is None]
+
+
+def _without_inertial(severity: Severity, links: list[str], lines: tuple[Line, ...]) -> Finding:
+    sentence = f"{some_of(links)}: moving without <inertial>, so without mass and inertia"
+    return Finding(severity, "no-inertial", tuple(links), sentence, lines)
 
 
 def points(subject: Subject) -> Iterator[Finding]:
@@ -84,26 +95,30 @@ def points(subject: Subject) -> Iterator[Finding]:
 
 
 def impossible(subject: Subject) -> Iterator[Finding]:
-    """Inertias that no body has: a principal one exceeds the sum of the others.
+    """Inertias that no body has: a principal one exceeds the sum of the others."""
+    if found := _impossible(subject):
+        yield _violating(Severity.NOTE, list(found), ())
 
-    A note where the rest of what moves with the link is far heavier, or nothing moves it.
-    """
+
+def harmful(subject: Subject) -> Iterator[Finding]:
+    """Those that are not outweighed by the rest of what moves with the link."""
+    odd = _impossible(subject)
+    found = [name for name, much in odd.items() if much > SHARE * _largest_around(subject, name)]
+    if found:
+        lines = tuple(_possible(name, tensor_of(subject.links[name])) for name in found)
+        yield _violating(Severity.MISLEADS, found, lines)
+
+
+def _impossible(subject: Subject) -> dict[str, float]:
+    """By how much links violate the triangle inequality, in [kg m^2]."""
     tensors = {name: tensor_of(link) for name, link in subject.links.items()}
-    excess = {name: _excess(x) for name, x in tensors.items() if x is not None}
-    odd = [name for name, much in excess.items() if much > 0.0]
-    matters = {name for name in odd if excess[name] > SHARE * _largest_around(subject, name)}
-    for severity, names in (
-        (Severity.MISLEADS, [name for name in odd if name in matters]),
-        (Severity.NOTE, [name for name in odd if name not in matters]),
-    ):
-        if names:
-            yield Finding(
-                severity,
-                "impossible-inertia",
-                tuple(names),
-                f"the principal inertias of {some_of(names)} violate the triangle inequality",
-                tuple(_possible(name, tensors[name]) for name in names),
-            )
+    excess = {name: _excess(tensor) for name, tensor in tensors.items() if tensor is not None}
+    return {name: much for name, much in excess.items() if much > 0.0}
+
+
+def _violating(severity: Severity, links: list[str], lines: tuple[Line, ...]) -> Finding:
+    sentence = f"the principal inertias of {some_of(links)} violate the triangle inequality"
+    return Finding(severity, "impossible-inertia", tuple(links), sentence, lines)
 
 
 def _largest_around(subject: Subject, link: str) -> float:

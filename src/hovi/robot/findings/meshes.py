@@ -10,6 +10,8 @@ from hovi.robot.findings.boxes import ShapeBox, quoted
 from hovi.robot.findings.finding import COMMAND_LINE, Finding, Line, Severity, element
 from hovi.robot.findings.subject import Subject
 
+NOWHERE = "any package folder"
+"""Where a mesh was looked for whose package is not known."""
 HUGE = 20.0
 """Size of a mesh over the reach of the robot from which it looks like millimetres."""
 LEAST = 5.0
@@ -37,14 +39,20 @@ def missing_meshes(subject: Subject, folder_of: Callable[[str], str]) -> Iterato
         links,
         f"{len(lost)} of {sum(bool(box.mesh) for box in subject.boxes)} meshes cannot be used, so "
         f"that {effect}, at {some_of(links)}: {problem}",
-        tuple(dict.fromkeys(_folder_line(x, folder_of) for x in lost if "not found" in x.problem)),
+        tuple(dict.fromkeys(line for box in lost for line in _folder_line(box, folder_of))),
     )
 
 
-def _folder_line(box: ShapeBox, folder_of: Callable[[str], str]) -> Line:
+def _folder_line(box: ShapeBox, folder_of: Callable[[str], str]) -> Iterator[Line]:
+    """The option for a mesh that is elsewhere; none for one that its package does not have."""
     package = box.mesh.partition("://")[2].lstrip("/").partition("/")[0]
-    folder = folder_of(box.mesh) or (f"FOLDER_THAT_HOLDS_{package}" if package else "FOLDER")
-    return Line(COMMAND_LINE, f"--package-dir {folder}")
+    if "was not found" not in box.problem:
+        return
+    folder = folder_of(box.mesh)
+    if NOWHERE in box.problem or not package:
+        folder = folder or (f"FOLDER_THAT_HOLDS_{package}" if package else "FOLDER")
+    if folder:
+        yield Line(COMMAND_LINE, f"--package-dir {folder}")
 
 
 def large_meshes(subject: Subject) -> Iterator[Finding]:
