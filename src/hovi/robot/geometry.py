@@ -130,8 +130,9 @@ def _find_file(filename: str, source: RobotSource, drawn: bool) -> tuple[Path, b
     except (OSError, RuntimeError, ValueError) as error:  # too long, a loop of links, a NUL
         why = reason(error) if isinstance(error, OSError) else "no file can have that path"
         raise ModelError(f"mesh {_short(filename)} cannot be looked for: {why}.") from error
-    kept = "" if filename not in source.meshes.meshes else " is too large for its motion's file and"
-    raise ModelError(f"mesh {_short(filename)}{kept} was not found in {_places(candidates)}.")
+    known = filename in source.meshes.meshes
+    left = " is not in the file of its motion, whose meshes are too large, and" if known else ""
+    raise ModelError(f"mesh {_short(filename)}{left} was not found in {_places(candidates)}.")
 
 
 def stored_meshes(sources: Iterable[RobotSource]) -> dict[str, StoredMeshes]:
