@@ -51,10 +51,11 @@ def test_random_poses_are_reached_in_the_cheapest_branch(scene: hovi.Scene, seed
     )
 
 
-@pytest.mark.parametrize("seed", [4, 5])
-def test_links_that_would_meet_count_in_the_choice(scene: hovi.Scene, seed: int) -> None:
-    """Seeds of which the cheapest branch of motions through the robot itself cost up to twice."""
-    start, goal = random_reach(scene, seed)
+def test_links_that_would_meet_count_in_the_choice(scene: hovi.Scene) -> None:
+    """The cheapest branch of motions through the robot itself costs 2.2 times the cheapest one."""
+    start = np.array([-2.3758, -1.7605, -1.7208, -0.5681, 0.5744, 1.6046])
+    there = np.array([-1.7827, 0.2879, -1.0746, 1.5469, 0.6747, -1.358])
+    goal = hovi.FrameGoal("tool0", scene.robot.frame_pose("tool0", there))
     found = hovi.plan(scene, start, goal, DURATION)
     assert found.success, found.message
     branches = hovi.inverse_kinematics(scene.robot, goal, near=start, self_collision=True)
