@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
+from functools import cached_property
 
 import coal
 import numpy as np
@@ -16,7 +17,7 @@ import pinocchio as pin
 
 from hovi.discrete.trajectory import Trajectory
 from hovi.planning.clearance.clearance import Clearance
-from hovi.planning.clearance.distances import Pair, distances_between
+from hovi.planning.clearance.distances import distances_between
 from hovi.robot.robot import Robot
 from hovi.system.dataclass import dataclass
 
@@ -70,88 +71,134 @@ def hull_overlaps(
             links = pair.link, pair.other
             if links in found or frozenset(links) in touching:
                 continue
-            meshes = mesh_distance(robot, pair, at)
+            meshes = _GivenLinks.of(robot, *links).distance(at)
             if meshes > 0 and (d[k] <= 0 or meshes >= apart.margin):
                 found[links] = HullOverlap(links, where, float(d[k]), meshes)
     return tuple(found.values())
-
-
-def mesh_distance(robot: Robot, pair: Pair, q: Array) -> float:
-    """Distance of the given shapes of two links at a configuration (nq,); 0 where they overlap."""
-    data, geometry = robot.model.createData(), robot.collision
-    assert geometry is not None
-    pin.forwardKinematics(robot.model, data, q)
-    frames = robot.model.frames
-    placed: dict[str, list[tuple[coal.CollisionGeometry, coal.Transform3s]]] = {}
-    for shape in geometry.geometryObjects:
-        name = str(frames[shape.parentFrame].name)
-        if name in (pair.link, pair.other):
-            at = data.oMi[shape.parentJoint] * shape.placement
-            transform = coal.Transform3s(at.rotation, at.translation)
-            placed.setdefault(name, []).append((shape.geometry, transform))
-    ends = placed.get(pair.link, []), placed.get(pair.other, [])
-    return min((_distance(*a, *b) for a in ends[0] for b in ends[1]), default=np.inf)
 
 
 def met_sentence(motion: Trajectory, overlap: HullOverlap) -> str:
     """When a motion brings the meshes of a pair that is left out into each other; "" if never."""
     robot = motion.robot
     assert robot is not None
-    pair = Pair(*overlap.links, obstacle=False)
     t = np.linspace(0.0, motion.duration, SAMPLES)
-    for at, q in zip(t, motion.configurations(t), strict=True):
-        if mesh_distance(robot, pair, q) == 0.0:
+    q = motion.configurations(t)
+    links = _GivenLinks.of(robot, *overlap.links)
+    for k in np.flatnonzero(_hulls(robot, overlap.links, q) <= 0.0):
+        if links.distance(q[k]) == 0.0:
             first, second = overlap.links
-            return f"The motion brings {first!r} and {second!r} into each other at t = {at:.3g} s."
+            return (
+                f"The motion brings {first!r} and {second!r} into each other at t = {t[k]:.3g} s."
+            )
     return ""
 
 
+def _hulls(robot: Robot, links: tuple[str, str], q: Array) -> Array:
+    """Distances of the convex hulls of two links at configurations (P, nq), exact below 0."""
+    distances = distances_between(robot, Clearance(self_collision=True))
+    pairs = [frozenset((pair.link, pair.other)) for pair in distances.pairs]
+    if frozenset(links) not in pairs:
+        return np.full(len(q), -np.inf)
+    k = pairs.index(frozenset(links))
+    wanted = np.zeros((len(q), len(pairs)), dtype=bool)
+    wanted[:, k] = True
+    return distances.values(q, 0.0, wanted)[:, k]
+
+
+@dataclass(frozen=True, eq=False)
+class _Given:
+    """A shape of a link as it was given. corners: of its triangles, (M, 3, 3); None without."""
+
+    joint: int
+    placement: pin.SE3
+    shape: coal.CollisionGeometry
+    corners: Array | None
+
+    def at(self, data: pin.Data) -> coal.Transform3s:
+        """Where it is, relative to the world."""
+        there = data.oMi[self.joint] * self.placement
+        return coal.Transform3s(there.rotation, there.translation)
+
+    @cached_property
+    def box(self) -> tuple[Array, Array]:
+        """The least and the largest coordinates of its corners, (3,) each, in [m]."""
+        assert self.corners is not None
+        return self.corners.min(axis=(0, 1)), self.corners.max(axis=(0, 1))
+
+    @property
+    def point(self) -> Array:
+        """A point of it, (3,), in [m]."""
+        if self.corners is not None:
+            return np.asarray(self.corners[0, 0])
+        shape = self.shape
+        return np.array(shape.points()[0] if isinstance(shape, coal.ConvexBase) else np.zeros(3))
+
+
+@dataclass(frozen=True, eq=False)
+class _GivenLinks:
+    """The shapes of two links as they were given."""
+
+    robot: Robot
+    first: list[_Given]
+    second: list[_Given]
+
+    @classmethod
+    def of(cls, robot: Robot, *links: str) -> _GivenLinks:
+        """Those of a robot's links by name."""
+        geometry = robot.collision
+        assert geometry is not None
+        found: dict[str, list[_Given]] = {name: [] for name in links}
+        for each in geometry.geometryObjects:
+            name = str(robot.model.frames[each.parentFrame].name)
+            if name in found:
+                known = each.parentJoint, each.placement, each.geometry, _corners(each.geometry)
+                found[name].append(_Given(*known))
+        return cls(robot, *(found[name] for name in links))
+
+    def distance(self, q: Array) -> float:
+        """Their distance at a configuration (nq,), in [m]; 0 where they overlap."""
+        data = self.robot.model.createData()
+        pin.forwardKinematics(self.robot.model, data, q)
+        ends = [[(each, each.at(data)) for each in link] for link in (self.first, self.second)]
+        return min((_distance(*a, *b) for a in ends[0] for b in ends[1]), default=np.inf)
+
+
 def _distance(
-    first: coal.CollisionGeometry,
-    at: coal.Transform3s,
-    second: coal.CollisionGeometry,
-    there: coal.Transform3s,
+    first: _Given, at: coal.Transform3s, second: _Given, there: coal.Transform3s
 ) -> float:
-    overlap = coal.CollisionResult()
+    overlap, result = coal.CollisionResult(), coal.DistanceResult()
+    if coal.collide(first.shape, at, second.shape, there, coal.CollisionRequest(), overlap):
+        return 0.0
     if _contains(first, at, second, there) or _contains(second, there, first, at):
         return 0.0
-    if coal.collide(first, at, second, there, coal.CollisionRequest(), overlap):
-        return 0.0
-    result = coal.DistanceResult()
-    coal.distance(first, at, second, there, coal.DistanceRequest(), result)
+    coal.distance(first.shape, at, second.shape, there, coal.DistanceRequest(), result)
     return float(max(result.min_distance, 0.0))
 
 
-def _contains(
-    mesh: coal.CollisionGeometry,
-    at: coal.Transform3s,
-    other: coal.CollisionGeometry,
-    there: coal.Transform3s,
-) -> bool:
+def _contains(mesh: _Given, at: coal.Transform3s, other: _Given, there: coal.Transform3s) -> bool:
     """Whether a point of another shape is in a closed mesh, whose triangles alone Coal looks at.
 
     By the winding number: the solid angles of the triangles sum to 4 pi inside.
     [JacobsonKavanSorkineHornung2013]
     """
-    if not isinstance(mesh, coal.BVHModelBase):
+    if mesh.corners is None:
         return False
-    inner = at.getRotation().T @ (there.getRotation() @ _point_of(other) + there.getTranslation())
-    corners = np.array(mesh.vertices()) - (inner - at.getRotation().T @ at.getTranslation())
-    a, b, c = np.moveaxis(corners[_triangles(mesh)], 1, 0)
+    inner = at.getRotation().T @ (
+        there.getRotation() @ other.point + there.getTranslation() - at.getTranslation()
+    )
+    if (inner < mesh.box[0]).any() or (inner > mesh.box[1]).any():
+        return False
+    a, b, c = np.moveaxis(mesh.corners - inner, 1, 0)
     la, lb, lc = (np.linalg.norm(x, axis=1) for x in (a, b, c))
     volume = np.vecdot(a, np.cross(b, c))
     rest = la * lb * lc + np.vecdot(a, b) * lc + np.vecdot(b, c) * la + np.vecdot(c, a) * lb
     return bool(abs(np.arctan2(volume, rest).sum()) > np.pi)
 
 
-def _point_of(shape: coal.CollisionGeometry) -> Array:
-    """A point of a shape, (3,), in [m]."""
-    if isinstance(shape, coal.BVHModelBase):
-        return np.array(shape.vertices()[0])
-    return np.array(shape.points()[0] if isinstance(shape, coal.ConvexBase) else np.zeros(3))
-
-
-def _triangles(mesh: coal.BVHModelBase) -> npt.NDArray[np.intp]:
-    """Numbers of the vertices of every triangle, (M, 3)."""
-    triangles = (mesh.tri_indices(k) for k in range(mesh.num_tris))
-    return np.array([[each[0], each[1], each[2]] for each in triangles], dtype=np.intp)
+def _corners(shape: coal.CollisionGeometry) -> Array | None:
+    """The corners of a mesh's triangles, (M, 3, 3), in [m]; None for another shape."""
+    if not isinstance(shape, coal.BVHModelBase):
+        return None
+    triangles = (shape.tri_indices(k) for k in range(shape.num_tris))
+    numbers = np.array([[each[0], each[1], each[2]] for each in triangles], dtype=np.intp)
+    return np.asarray(np.array(shape.vertices())[numbers])
