@@ -183,7 +183,10 @@ def test_beyond_20_mb_names_and_hashes_are_kept(large: Path, tmp_path: Path) -> 
     assert file.stat().st_size < 100_000
     robot = robot_in(file)
     assert robot.visual is None
-    assert "is not in the file of its motion, whose meshes are too large, and was not" in robot.visual_problem
+    assert (
+        "is not in the file of its motion, whose meshes are too large, and was not"
+        in robot.visual_problem
+    )
     assert "--package-dir" in robot.visual_problem
     assert robot.collision is not None
     assert robot.collision_problem == ""

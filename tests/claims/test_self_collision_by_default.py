@@ -112,6 +112,26 @@ def test_a_pair_of_which_hulls_alone_overlap_is_left_out_and_named(tmp_path: Pat
     assert found.trajectory.metadata["clearance"]["left_out"] == [["a", "c"]]
 
 
+def test_a_motion_through_the_mesh_of_a_pair_that_is_left_out_is_said(tmp_path: Path) -> None:
+    """The ball turns about z, from between the prongs through one of them to its far side."""
+    fork(tmp_path, 0.0)
+    path = tmp_path / "fork.urdf"
+    before, after = path.read_text().split('name="j_c"')
+    path.write_text(f'{before}name="j_c"{after.replace("1 0 0", "0 0 1", 1)}')
+    robot = hovi.load_robot(path)
+    scene, goal = hovi.Scene(robot, [hovi.effects.Gravity()]), [0.0, 0.0, 1.0, 0.0]
+    found = hovi.plan(scene, [0.0] * 4, goal, 1.0, intervals=8)
+    assert found.success, found.message
+    said = next(each for each in found.trajectory.cautions if "into each other at" in each)
+    assert "The motion brings 'a' and 'c' into each other at t =" in said
+    t = float(said.rsplit("t = ", 1)[1].split()[0])
+    q = found.trajectory.sample(np.linspace(0.0, 1.0, 401)).q
+    meet = [MeshDistances(robot).at(each)[0] == 0.0 for each in q]
+    assert not meet[0]
+    assert not meet[-1]
+    assert t == pytest.approx(meet.index(True) / 400, abs=1 / 100)
+
+
 @pytest.mark.parametrize("x", [0.11, 0.15])
 def test_meshes_that_overlap_at_an_end_are_refused(tmp_path: Path, x: float) -> None:
     """A ball through the side of a prong, and one that is wholly in it."""
