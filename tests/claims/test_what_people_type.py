@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from pathlib import Path
 
 import numpy as np
@@ -33,6 +34,30 @@ def test_a_solution_stands_for_its_trajectory(solution: hovi.Solution, tmp_path:
         assert one == other
     with pytest.raises(InputError, match="expected a Trajectory"):
         hovi.replay(3)  # type: ignore[arg-type]
+    for name in ("motion.npz", tmp_path / "motion.npz"):
+        with pytest.raises(InputError, match=r"read the file by hovi\.Trajectory\.load"):
+            hovi.replay(name)  # type: ignore[arg-type]
+
+
+def test_a_pose_is_taken_with_its_frame_and_answered_without(
+    scene: hovi.Scene, solution: hovi.Solution
+) -> None:
+    pose = scene.robot.frame_pose("tool0", np.array(AWAY))
+    found = hovi.plan(scene, HOME, hovi.FrameGoal("tool0", pose), 2.0)
+    assert found.success, found.message
+    reached = scene.robot.frame_pose("tool0", found.trajectory.q[-1])
+    np.testing.assert_allclose(reached, pose, atol=1e-5)
+    tasks = [
+        lambda given: hovi.plan(scene, HOME, given, 2.0),
+        lambda given: hovi.plan(scene, given, HOME, 2.0),
+        lambda given: hovi.plan_sequence(scene, HOME, [hovi.Segment(given, 2.0)]),
+        lambda given: solution.replan(goal=given),
+        lambda given: solution.advance(0.5, goal=given),
+    ]
+    for given, what in ((pose, "pose"), (pose.tolist(), "pose"), (pose[:3, :3], "rotation")):
+        for task in tasks:
+            with pytest.raises(InputError, match=f"a {what} of no frame: give .*'tool0', {what}="):
+                task(given)
 
 
 def test_a_rotation_of_three_digits_is_the_nearest_one(scene: hovi.Scene) -> None:
@@ -59,7 +84,10 @@ def test_a_rotation_of_three_digits_is_the_nearest_one(scene: hovi.Scene) -> Non
     ],
 )
 def test_options_of_other_planners_are_answered(
-    scene: hovi.Scene, option: str, instead: str
+    scene: hovi.Scene, solution: hovi.Solution, option: str, instead: str
 ) -> None:
     with pytest.raises(InputError, match=f"there is no option {option!r}: .*{instead}"):
         hovi.plan(scene, HOME, AWAY, 2.0, **{option: "50 %"})
+    for again in (solution.replan, functools.partial(solution.advance, 0.5)):
+        with pytest.raises(InputError, match=f"has no option {option!r}: .*{instead}"):
+            again(**{option: "50 %"})

@@ -11,6 +11,7 @@ from typing import Any
 
 from hovi.checks.kinds import is_number, shown
 from hovi.errors import InputError, nearest
+from hovi.planning.problem.notation.other_planners import instead_of
 from hovi.system.dataclass import dataclass
 
 MAX_WHOLE_NUMBER = 10**9
@@ -96,32 +97,13 @@ def _refusal(name: str, must_be: str, number: Any) -> InputError:
     return InputError(f"`{name}` must be {must_be}, but it is {shown(number)}.")
 
 
-ELSEWHERE = {
-    "constraints": "conditions of your own along a motion are not supported, a stiff running cost "
-    "comes near them: see docs/costs.md and docs/when_not.md",
-    "contacts": "contacts are not planned for: see docs/when_not.md",
-    **dict.fromkeys(
-        ("velocity_scaling", "max_velocity_scaling_factor"),
-        'give limits, such as limits={"v": "50 %"} of those of the robot, or numbers in rad/s',
-    ),
-    **dict.fromkeys(
-        ("acceleration_scaling", "max_acceleration_scaling_factor"),
-        'give limits, such as limits={"base": "panda", "a": "50 %"} of those that the maker of an '
-        "arm publishes, or numbers in rad/s^2",
-    ),
-}
-"""What to do instead of options that other planners have, in Python and in scene files."""
-
-
 def require_known(options: type, names: Iterable[str]) -> None:
     """Raise InputError for unknown option names."""
     known = option_infos(options)
     for name in names:
         if name not in known:
-            advice = ELSEWHERE.get(name)
-            raise InputError(
-                f"there is no option {name!r}: {f'{advice}.' if advice else nearest(name, known)}"
-            )
+            hint = instead_of(name) or nearest(name, known)
+            raise InputError(f"there is no option {name!r}: {hint}")
 
 
 def described(options: type) -> str:

@@ -11,6 +11,7 @@ from hovi.discrete.state import State, as_state
 from hovi.errors import InputError, nearest
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.kinematics.orientation import ORIENTATIONS
+from hovi.planning.problem.notation.other_planners import refuse_pose
 from hovi.robot.robot import Robot
 from hovi.robot.space.coordinates import Coordinates
 
@@ -53,6 +54,8 @@ def as_end(given: End, on: Coordinates, name: str) -> State | FrameGoal:
             if isinstance(on, Robot):
                 given.check(on)
             return given
+    if not isinstance(given, State | str | Mapping):
+        refuse_pose(given, on, name)
     state = as_state(given, on, name)
     if not isinstance(given, State):
         state.on(on, name)

@@ -21,6 +21,7 @@ from hovi.planning.problem.inverse_kinematics import (
     position_bounds,
 )
 from hovi.planning.problem.notation.ends import End, as_end
+from hovi.planning.problem.notation.other_planners import instead_of
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.robot.space.coordinates import Coordinates
 from hovi.robot.space.joint_table import with_angles
@@ -93,7 +94,7 @@ def require_known(
                 f"{method.__name__} keeps `{name}` as planned: call plan again to change it."
             )
         if name not in solving:
-            hint = nearest(name, {*own, *solving})
+            hint = instead_of(name) or nearest(name, {*own, *solving})
             raise InputError(f"{method.__name__} has no option {name!r}: {hint}")
 
 
