@@ -133,3 +133,18 @@ def test_the_error_of_a_row_is_at_least_the_true_one(
         fine = hovi.plan(*ends, options=task.options, processes=1, **grid)
         assert fine.success
         assert row["error_estimate"] >= abs(row["cost"] / fine.cost - 1) - 1e-6
+
+
+@pytest.mark.parametrize(("line", "said"), [("", True), ("format = 2\n", False)])
+def test_a_study_of_a_scene_without_a_format_says_that_links_may_meet(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], line: str, said: bool
+) -> None:
+    (tmp_path / "scene.toml").write_text(
+        f'{line}robot = "ur5"\nduration = 1.0\nstart = [0, -1, 1, 0, 0, 0]\n'
+        "goal = [0.1, -1, 1, 0, 0, 0]\neffects.gravity.acceleration = 9.81\n"
+    )
+    study = tmp_path / "study.toml"
+    study.write_text('scene = "scene.toml"\n[[vary]]\nfield = "duration"\nvalues = [1.0]\n')
+    assert main(["study", "run", str(study), "--out", str(tmp_path / "out"), "--workers", "1"]) == 0
+    told = capsys.readouterr().err
+    assert ("note: scene.toml has no `format`, so links may meet" in told) is said

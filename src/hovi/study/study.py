@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Any, Literal, Self
 
 from hovi.checks.arguments import check_arguments_except
 from hovi.discrete.trajectory import Trajectory
-from hovi.errors import InputError, StudyError
+from hovi.errors import HoviError, InputError, StudyError
 from hovi.planning.task_file.messages import TomlText
 from hovi.planning.task_file.reading import parsed, read_toml
+from hovi.planning.task_file.scene_cache import SceneCache
 from hovi.study.cells.cells import Cells
 from hovi.study.cells.extras import require_extra
 from hovi.study.running.progress import OnProgress, told
@@ -124,6 +125,15 @@ class Study:
     def count(self) -> int:
         """The number of plans."""
         return self.cells.count
+
+    @property
+    def note(self) -> str:
+        """What is assumed of its scene file, as a sentence; "" if nothing is known to be."""
+        template = self.cells.template
+        try:
+            return template.task(template.table, SceneCache()).note
+        except HoviError:  # as where an axis gives what the file lacks
+            return ""
 
     def run(
         self,

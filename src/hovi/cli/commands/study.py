@@ -61,6 +61,7 @@ def run(
     after Ctrl-C; 2 for invalid input.
     """
     import dataclasses
+    import sys
 
     from hovi.cli.reports.study import Told, print_ending
     from hovi.planning.search.multistart import default_processes
@@ -69,6 +70,8 @@ def run(
     given = {"samples": sample, "sample_format": sample_format}
     changes: dict[str, Any] = {name: each for name, each in given.items() if each is not None}
     chosen = dataclasses.replace(Study.read(study), **changes)
+    if note := chosen.note:
+        print(f"note: {note}", file=sys.stderr, flush=True)
     with Told() as told:
         report = chosen.run(
             out,
