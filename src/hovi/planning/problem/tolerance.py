@@ -30,7 +30,7 @@ density of the cost, which exceeds its minimum by some ten times as much."""
 BARRIER_SHARE, LARGEST_BARRIER = 3e-3, 3e-6
 """The same for a tolerance of the cost, as a share of it, and at most."""
 FINER_SHARES = 1 / 30, 1e-3, 1e-5
-"""Shares of a tolerance that are tried where a minimum meets it and is not resolved."""
+"""Fractions of a tolerance that are tried if a minimum satisfies it and is still not resolved."""
 REMAINING_SHARE = 0.5
 """Predicted relative decrease of the last step within limits, as a share of the last barrier."""
 
@@ -91,7 +91,7 @@ class Tolerance:
 
     @property
     def finer(self) -> tuple[Tolerance, ...]:
-        """Finer ones of the same quantity, the coarsest first."""
+        """Smaller tolerances of the same quantity, the largest first."""
         return tuple(replace(self, size=share * self.size) for share in FINER_SHARES)
 
     @classmethod

@@ -1,8 +1,8 @@
 """objective = "time": the least duration between two bounds, by solves for growing weights of time.
 
 With J the cost without time, J + w T has its minimum at the least duration that limits allow, to an
-error that vanishes as w grows: the effort J has the weight 1/w beside the time. The weight of the
-effort is halved until that no longer changes the duration.
+error that vanishes as w grows: relative to the time, the effort J has the weight 1/w, which is
+halved until that no longer changes the duration.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from hovi.system.deadline import Deadline
 UNCHANGED = 1e-3
 """Relative change of the duration that counts as none, twice in a row."""
 EFFORT_SHARE = 1e-2
-"""Share of the cost that effort may have once its weight is only halved."""
+"""Once the effort is less than this fraction of w T, its weight is only halved."""
 LARGEST_JUMP, LEAST_JUMP = 30.0, 2.0
 """Largest factor of the weight of time before that, and the least, which halves the effort's."""
 MAX_SOLVES = 60
@@ -54,7 +54,9 @@ def least_duration(
 class _Search:
     """Solves for one weight of time after the other, each from the motion before.
 
-    found: successes, with their weights. changes: of the duration, each relative to the one before.
+    planned, options: see `least_duration`. weight: that of the best motion so far.
+    changes: relative changes of the duration by the last successes that halved the effort's weight.
+    steps, seconds: sums over all solves.
     """
 
     def __init__(

@@ -16,9 +16,9 @@ Array = npt.NDArray[np.float64]
 
 
 def require_ranges(robot: Robot, others: Collection[int] = ()) -> None:
-    """Raise InputError for a range of the URDF without an inside, such as that of a file without.
+    """Raise InputError for joints whose position range in the URDF is empty, lower >= upper.
 
-    others: coordinates that have a range of their own.
+    others: indices in v whose ranges the user gives.
     """
     names = [
         robot.coordinate_names[i]

@@ -31,7 +31,7 @@ def require_supported(problem: ProblemSummary, order: int) -> None:
 
 
 def require_dynamics(problem: ProblemSummary) -> None:
-    """Raise ModelError for a robot that has not what is asked of it: moving joints, and torques."""
+    """Raise ModelError for a robot without moving joints, or without inertia if torques matter."""
     for scene in problem.scenes:
         require_plannable(scene, needs_torques(problem))
 

@@ -26,17 +26,17 @@ from hovi.robot.space.coordinates import Coordinates
 Array = npt.NDArray[np.float64]
 
 TIGHT = 0.8
-"""Least share of its time that the least time of a travel takes where its ramps get nodes."""
+"""Ramps get nodes where the least time of a travel is at least this fraction of its time."""
 GRADES = 2.0 ** np.arange(-2, 12)
 """Times of nodes, as multiples of a ramp, until they are as far apart as those of the grid."""
 SMOOTH_GRADES = np.sort([*2.0 ** np.arange(-3, 12), 0.75, 0.875])
 """The same where the acceleration is continuous, and has to vanish after a ramp as well."""
 CLOSE = 1e-6
-"""Share of the duration within which two nodes are one."""
+"""Two nodes are one if they are nearer than this fraction of the duration."""
+NEAR = 0.1
+"""Nodes of two joints are one if they are nearer than this fraction of their time from the stop."""
 ENDS = "start", "goal"
 """Names of the ends of a motion."""
-NEAR = 0.1
-"""The same for nodes of ramps of different joints, as a share of their time from the stop."""
 
 
 def graded_to_ramps(problem: TrajectoryProblem) -> Grid:
@@ -87,9 +87,9 @@ def _ramp_nodes(leg: Leg, grades: Array, longest: float) -> Array:
 
 
 def _velocities(stop: Stop, on: Coordinates) -> Array:
-    """Those of the joints at a stop, (nv,); NaN where they are free at an end of the motion.
+    """Velocities of the joints at a stop, (nv,), in [rad/s] or [m/s]; NaN if free at an end.
 
-    At free ones on the way joints may turn round, and so have ramps as at rest.
+    Where a via point leaves a velocity free, the joint may turn round, with ramps as at rest.
     """
     assert isinstance(stop.goal, State)
     ends = stop.name in ENDS
@@ -98,9 +98,9 @@ def _velocities(stop: Stop, on: Coordinates) -> Array:
 
 
 def _ramps(leg: Leg, i: int, distance: float, velocities: tuple[float, float]) -> Array:
-    """How long a joint speeds up and slows down at most, (2,), in [s]; 0 where it is not pressed.
+    """Longest times in which joint i speeds up and slows down, (2,), in [s]; 0 if not pressed.
 
-    velocities: at its ends, NaN where free.
+    distance: of its travel, in [rad] or [m]. velocities: at the ends, NaN where free.
     """
     pace = leg.pace
     speeds = float(pace.down[i]), float(pace.up[i])

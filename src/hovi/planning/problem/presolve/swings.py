@@ -19,22 +19,22 @@ from hovi.planning.problem.problem import TrajectoryProblem
 Array = npt.NDArray[np.float64]
 
 MOST_SWINGS = 130.0
-"""Number of swings above which a motion is not sought: one link is planned for with as many."""
+"""Number of swings above which no motion is sought; a pendulum with as many is resolved."""
 DECAY = 7.0
-"""Exponent by which a swing has decayed."""
+"""A swing has decayed once |Re lambda| t is as large."""
 LONG = 50.0
 """Duration from which swings are counted, in [s]."""
 AT_REST = 1e-3
-"""Share of the least static cost by which that of an end exceeds it if the robot rests there."""
+"""The robot may rest at ends whose static cost exceeds the least by at most this fraction."""
 MAX_STEPS = 200
 """Maximum number of steps to the state of least static cost."""
 
 
 def too_many_swings(problem: TrajectoryProblem) -> str:
-    """How often a robot swings in a motion that is too long, as a clause; "" if it is not."""
+    """The duration against the period of a swing, as a clause; "" if a grid may resolve it."""
     T = problem.grid.duration
-    searched = problem.about_robot and problem.robot.space.flat and not problem.ld.lagrangian.timed
-    if T < LONG or not searched or problem.ld.segments is not None or problem.via:
+    supported = problem.about_robot and problem.robot.space.flat and not problem.ld.lagrangian.timed
+    if T < LONG or not supported or problem.ld.segments is not None or problem.via:
         return ""
     at_rest = _Static(problem)
     first, last = problem.boundary[0], problem.boundary[2]
@@ -58,7 +58,7 @@ def too_many_swings(problem: TrajectoryProblem) -> str:
 
 
 class _Static:
-    """The cost of a problem's robot that does not move."""
+    """The static cost of a problem: that of its robot at rest."""
 
     def __init__(self, problem: TrajectoryProblem) -> None:
         self.lagrangian, self.nv = problem.ld.lagrangian, problem.robot.nv
@@ -73,7 +73,7 @@ class _Static:
         return float(value[0]), np.asarray(gradient)[0, 0]
 
     def least(self, q: Array) -> Array:
-        """A configuration within the limits of least cost at rest, from another, (nq,)."""
+        """A configuration of least static cost within the limits, (nq,). q: where to begin."""
         from scipy.optimize import minimize
 
         bounds, options = list(zip(self.lower, self.upper, strict=True)), {"maxiter": MAX_STEPS}
@@ -94,11 +94,11 @@ class _Static:
         for i in range(k + 1):
             for j in range(k + 1):
                 powers[i + j] += (-1.0) ** i * hessian[i][free][:, j][:, free]
-        first, last = np.eye(2 * k * n), np.eye(2 * k * n, k=n)
-        first[-n:, -n:] = powers[-1]
-        last[-n:] = -np.concatenate(powers[:-1], axis=1)
+        A, B = np.eye(2 * k * n, k=n), np.eye(2 * k * n)  # A x = lambda B x
+        A[-n:] = -np.concatenate(powers[:-1], axis=1)
+        B[-n:, -n:] = powers[-1]
         try:
-            found = eigvals(last, first) if n > 0 else np.zeros(0)
+            found = eigvals(A, B) if n > 0 else np.zeros(0)
         except LinAlgError:
             found = np.zeros(0)
         return np.asarray(found[np.isfinite(found)])

@@ -46,9 +46,9 @@ class SolutionSummary(Summarized):
     def violation(self) -> str:
         """What the motion violates of its ends, limits, distances and equations, "" if nothing.
 
-        A clause about the first that does not hold to 1e-6. What no motion meets, such as a goal at
-        a bound that is reached from beyond it, the motion that is returned does not meet either.
-        InputError without a problem.
+        A clause about the first that does not hold to 1e-6. If none is measured but the problem is
+        infeasible, as at a goal that can only be reached from beyond a bound, its message.
+        Raises InputError without a problem.
         """
         violated = violation_of(self._solved_problem, self.trajectory)
         if not violated and self.status is Status.INFEASIBLE:
