@@ -18,7 +18,7 @@ from hovi.planning.obstacles.obstacle import Obstacle
 from hovi.planning.obstacles.preparation import prepared_within
 from hovi.planning.problem.goals import Via
 from hovi.planning.problem.limits import Limits, as_limits
-from hovi.planning.problem.notation.objective import IN_WORDS, require_objective
+from hovi.planning.problem.notation.objective import IN_WORDS, require_objective, with_objective
 from hovi.planning.problem.notation.via_points import as_via
 from hovi.planning.problem.tolerance import Tolerance
 from hovi.planning.problem.units import as_time_limit
@@ -323,24 +323,37 @@ class PlanOptions:
         options.__dict__["clearance"] = clearance
         return options
 
-    def order_of(self, scene: Scene) -> int:
-        """The order of the Lagrangian of a motion in a scene: 3 with a cost on the jerk."""
-        return 3 if self.smooth or self.objective == "jerk" else scene.order
+    def holding(self, scene: Scene) -> Scene:
+        """The scene with a robot that holds what is grasped."""
+        if not self.grasped:
+            return scene
+        from hovi.planning.obstacles.grasped import scene_holding  # 10 ms
+
+        return scene_holding(scene, tuple(self.grasped))
+
+    def aiming(self, scene: Scene) -> Scene:
+        """The scene with the effects of the objective. Raises InputError as with_objective does."""
+        return with_objective(scene, self.objective, self.weight is not None)
 
     def on(self, scene: Scene) -> Self:
         """These options with limits and tolerance resolved for a scene's robot, with defaults.
 
-        A robot without inertia has no limits on torques, as it has none.
-
         Raises InputError for values that do not fit the robot.
         """
-        tolerance, robot = self.effective_tolerance, scene.robot
+        tolerance, limits = self.effective_tolerance, self.limits_on(scene, self.limits)
         if tolerance is not None:
-            tolerance = Tolerance.of(tolerance, robot)
-        limits = as_limits(robot, self.limits, self.order_of(scene))
-        if limits.on_torques and without_inertia(scene):
-            limits = limits.without_torques
+            tolerance = Tolerance.of(tolerance, scene.robot)
         return self.with_changes(limits=limits, tolerance=tolerance)
+
+    def limits_on(self, scene: Scene, given: Any) -> Limits:
+        """Limits of a scene's robot, without those on torques if it has no inertia.
+
+        given: as for `as_limits`. Raises InputError for limits that do not fit the robot.
+        """
+        order = 3 if self.smooth or self.objective == "jerk" else scene.order
+        limits = as_limits(scene.robot, given, order)
+        without = limits.on_torques and without_inertia(scene)
+        return limits.without_torques if without else limits
 
 
 def _withdrawn(changes: Mapping[str, Any]) -> dict[str, Any]:

@@ -20,7 +20,6 @@ from hovi.planning.clearance.self_collisions import not_looked_at, pairs_left_ou
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.goals import Via
 from hovi.planning.problem.notation.ends import End, as_end
-from hovi.planning.problem.notation.objective import with_objective
 from hovi.planning.problem.notation.smoothing import smoothed
 from hovi.planning.problem.notation.whole_turns import says_turns
 from hovi.planning.problem.presolve.assumptions import assumptions
@@ -126,18 +125,18 @@ def plan(
     options = PlanOptions() if options is None else options
     expect(options, PlanOptions, "hovi.PlanOptions(...), or its fields by keyword")
     options = options.with_changes(**changes)
-    scene = holding(scene, options)
+    scene = options.holding(scene)
     first = as_end(start, scene.robot, "start")
     goal = with_others(goal, options.group, scene.robot, first)
     given = first, _goal(goal, scene.robot, options)
     if options.group is not None:
         scene, start_end, goal_end = in_group(scene, options.group, *given)
         given = start_end, goal_end
-    scene = aiming(scene, options)
+    length = as_duration(duration)
+    planned = functools.partial(_planned, options.aiming(scene), *given, length, progress)
     if options.objective == "time":
-        whole = functools.partial(_planned, scene, *given, as_duration(duration), progress)
-        return least_duration(whole, as_duration(duration), options)
-    return _planned(scene, *given, as_duration(duration), progress, options, began)
+        return least_duration(planned, length, options)
+    return planned(options, began)
 
 
 def _planned(
@@ -149,7 +148,10 @@ def _planned(
     options: PlanOptions,
     began: float | None = None,
 ) -> Solution:
-    """The motion in a scene that has what is grasped and the objective. began: by the clock."""
+    """The motion in a scene whose robot holds what is grasped, with the effects of the objective.
+
+    began: when the plan did, by the clock; now by default.
+    """
     began = time.perf_counter() if began is None else began
     given = start, goal
     chosen, apart = kept_apart(options.on(scene), scene.robot, ends_of(*given, options.via))
@@ -291,20 +293,6 @@ def kept_apart(
     except ModelError:  # all pairs are left out
         left = decided.with_changes(self_collision=False)
     return left, Apart(overlaps)
-
-
-def holding(scene: Scene, options: PlanOptions) -> Scene:
-    """The scene with a robot that holds what is grasped."""
-    if not options.grasped:
-        return scene
-    from hovi.planning.obstacles.grasped import scene_holding  # 10 ms
-
-    return scene_holding(scene, tuple(options.grasped))
-
-
-def aiming(scene: Scene, options: PlanOptions) -> Scene:
-    """The scene with the effects of the objective."""
-    return with_objective(scene, options.objective, options.weight is not None)
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from hovi.discrete.grid import Grid
 from hovi.discrete.state import State
 from hovi.errors import InputError, warn
-from hovi.planning.problem.limits import Limits, as_limits
+from hovi.planning.problem.limits import Limits
 from hovi.planning.problem.seams import Seam
 from hovi.planning.refinement.adaptive import MAX_FIRST_INTERVALS, first_grid
 from hovi.planning.search.job import Acting, Job, Part
@@ -21,7 +21,7 @@ from hovi.planning.sequence.branches import End, Leg, chosen_branches
 from hovi.planning.sequence.segment import Segment, names_of
 from hovi.planning.sequence.segment_findings import segment_findings
 from hovi.planning.sequence.segment_smoothing import smoothed_segments
-from hovi.scene.scene import Scene, without_inertia
+from hovi.scene.scene import Scene
 from hovi.schemes import of_order
 
 Array = npt.NDArray[np.float64]
@@ -77,11 +77,10 @@ def limits_of(
     scene: Scene, segments: Sequence[Segment], options: PlanOptions
 ) -> tuple[Limits, ...]:
     """The limits of every segment. Raises InputError for the torque rate, which jumps."""
-    order, found = options.order_of(scene), []
+    found = []
     for name, each in zip(names_of(segments), segments, strict=True):
         given = options.limits if each.limits is None else each.limits
-        own = as_limits(scene.robot, given, order)
-        found.append(own.without_torques if without_inertia(scene) else own)
+        found.append(options.limits_on(scene, given))
         if found[-1].on_torque_rate:
             raise InputError(
                 f"{name!r} has limits on the torque rate, but torques jump where the segments of a "

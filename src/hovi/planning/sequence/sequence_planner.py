@@ -18,9 +18,7 @@ from hovi.planning.search.job import Acting
 from hovi.planning.search.option_fields import spell_out
 from hovi.planning.search.options import PlanOptions
 from hovi.planning.search.planner import (
-    aiming,
     ends_of,
-    holding,
     kept_apart,
     plan,
     run,
@@ -121,8 +119,8 @@ def plan_sequence(
         raise InputError(
             'objective = "time" needs a free duration, and those of segments are fixed.'
         )
-    scene, begin, goals = _in_group(holding(scene, chosen), start, parts, chosen)
-    scene = aiming(scene, chosen)
+    scene, begin, goals = _in_group(chosen.holding(scene), start, parts, chosen)
+    scene = chosen.aiming(scene)
     deadline = Deadline(chosen.time_limit_seconds)
     names = (f"the goal of {name!r}" for name in names_of(parts))
     stops = ends_of(begin, None, chosen.via) | dict(zip(names, goals, strict=True))

@@ -12,7 +12,6 @@ from hovi.discrete.state import State
 from hovi.errors import InputError, warn
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.notation.ends import as_end
-from hovi.planning.problem.notation.objective import with_objective
 from hovi.planning.problem.units import as_duration
 from hovi.planning.search.option_fields import option_infos
 from hovi.planning.search.options import PlanOptions
@@ -114,17 +113,12 @@ class Task(Summarized):
     @property
     def held_scene(self) -> Scene:
         """The scene with what its robot holds."""
-        if not self.options.grasped:
-            return self.scene
-        from hovi.planning.obstacles.grasped import scene_holding  # 10 ms
-
-        return scene_holding(self.scene, tuple(self.options.grasped))
+        return self.options.holding(self.scene)
 
     @property
     def planned_scene(self) -> Scene:
         """The scene with what its robot holds, and with the effects of the objective."""
-        options = self.options
-        return with_objective(self.held_scene, options.objective, options.weight is not None)
+        return self.options.aiming(self.held_scene)
 
     @property
     def start_state(self) -> State:
