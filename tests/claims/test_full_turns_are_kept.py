@@ -118,11 +118,66 @@ def test_goals_are_reached_at_their_angle(
         assert np.cos(reached[2] - 0.3) == pytest.approx(1.0)
 
 
+def test_a_guess_of_other_turns_is_turned_on(scene: hovi.Scene) -> None:
+    near = hovi.plan(scene, [9.28, 0.1, 0.0], [9.0, 0.4, 0.3], 3.0).trajectory
+    for goal in ([15.0, 0.4, 0.3], [9.1, 0.4, 7.0], [-4.0, 0.4, 0.3]):
+        found = hovi.plan(scene, [9.28, 0.1, 0.0], goal, 3.0, guess=near)
+        assert found.success, found.message
+        np.testing.assert_allclose(found.trajectory.positions(3.0)[0], goal, atol=1e-9)
+    smooth = {"smooth": True, "tolerance": 1e-2}
+    near = hovi.plan(scene, [9.28, 0.1, 0.0], [9.0, 0.4, 0.3], 3.0, **smooth).trajectory
+    found = hovi.plan(scene, [9.28, 0.1, 0.0], [15.0, 0.4, 0.3], 3.0, guess=near, **smooth)
+    assert found.success, found.message
+
+
+def test_a_floating_robot_keeps_them(urdf: Path) -> None:
+    robot = hovi.load_robot(urdf, free_flyer=True)
+    scene = hovi.Scene(robot, [hovi.effects.Armature(0.5)])
+    base = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]
+    start = {"root_joint": base, "wheel": 9.28, "arm": 0.1, "drill": -20.0}
+    goal = {"root_joint": base, "wheel": 15.0, "arm": 0.3, "drill": -19.0}
+    found = hovi.plan(scene, start, goal, 3.0, limits="none")
+    assert found.success, found.message
+    rest = found.advance(1.0)
+    for motion in (found.trajectory, rest.trajectory):
+        end = motion.positions(motion.duration)[0]
+        np.testing.assert_allclose(end[6:], [15.0, 0.3, -19.0], atol=1e-9)
+    np.testing.assert_allclose(found.trajectory.positions(0.0)[0, 6:], [9.28, 0.1, -20.0])
+    np.testing.assert_allclose(rest.trajectory.positions(0.0), found.trajectory.positions(1.0))
+
+
 def test_turns_of_a_goal_unwind(scene: hovi.Scene) -> None:
     home = hovi.State([0.0, 0.0, 0.0], turns={"wheel": -1})
     found = hovi.plan(scene, [9.28 - 1.0, 0.1, 0.0], home, 4.0)
     assert found.success
     np.testing.assert_allclose(found.trajectory.positions(4.0)[0], 0.0, atol=1e-9)
+
+
+def test_angles_of_free_joints_are_guesses(scene: hovi.Scene) -> None:
+    start, goal = [9.28, 0.1, 0.0], [15.0, 0.4, 0.3]
+    for ends in (
+        (start, hovi.State(goal, free=("wheel",))),
+        (hovi.State(start, free=("wheel",)), goal),
+        (hovi.State([9.4, 0.1, 0.0], free=("wheel",)), hovi.State([9.5, 0.4, 0.3])),
+    ):
+        found = hovi.plan(scene, *ends, 3.0)
+        assert found.success, found.message
+        assert abs(found.trajectory.positions(0.0)[0, 0] - 9.28) < np.pi
+    assert found.trajectory.positions(3.0)[0, 0] == pytest.approx(9.5)
+
+
+@pytest.mark.parametrize("turns", [-3, -1, 1, 2])
+def test_half_turns_are_no_edge(scene: hovi.Scene, tmp_path: Path, turns: int) -> None:
+    for near in (0.0, 1e-16, -1e-16, 1e-9, -1e-9):
+        start = [np.pi + TURN * turns + near, 0.1, -np.pi]
+        found = hovi.plan(scene, start, [start[0] + 0.5, 0.4, -np.pi], 2.0, tolerance=1e-2)
+        assert found.success, found.message
+        found.trajectory.save(tmp_path / "motion.npz")
+        for motion in (found.trajectory, hovi.Trajectory.load(tmp_path / "motion.npz")):
+            np.testing.assert_allclose(motion.positions(0.0)[0], start, atol=1e-8)
+            np.testing.assert_allclose(motion.positions(2.0)[0, 0], start[0] + 0.5, atol=1e-8)
+        rest = found.advance(0.0)
+        np.testing.assert_allclose(rest.trajectory.positions(0.0)[0], start, atol=1e-8)
 
 
 @pytest.mark.parametrize("goal", [10.3, 7.0 + TURN])

@@ -15,7 +15,7 @@ from hovi.robot.robot import Robot
 from hovi.robot.space.angle_ranges import angles_in_degrees
 from hovi.robot.space.coordinates import Coordinates
 from hovi.robot.space.joint_table import angles_in, configuration_of, rates_of, with_angles
-from hovi.robot.space.turns import turns_of
+from hovi.robot.space.turns import known_or, nearest_angles, remainder
 from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
@@ -101,9 +101,14 @@ class State:
         """The angles that q gives of continuous joints, NaN elsewhere, shape (nv,), in [rad]."""
         return angles_in(self.q, coordinates)
 
-    def turns_made(self, coordinates: Coordinates) -> dict[str, int]:
-        """Full turns of the continuous joints at this state, of those that have made any."""
-        turns = turns_of(self.angles_on(coordinates))
+    def turns_made(self, coordinates: Coordinates, q: Array) -> dict[str, int]:
+        """Full turns of the continuous joints, of those that have made any.
+
+        q: configuration (nq,) of the state, which is another one where joints are free.
+        """
+        rest = remainder(q, coordinates.space)
+        angles = nearest_angles(q, known_or(self.angles_on(coordinates), rest), coordinates.space)
+        turns = np.round((angles - rest) / (2 * np.pi))
         return {coordinates.coordinate_names[i]: int(turns[i]) for i in np.flatnonzero(turns)}
 
     def resolved(self, coordinates: Coordinates, name: str) -> State:

@@ -156,7 +156,7 @@ def simulate(
     warn_of_degrees(scene.robot, [q])
     x, p = legendre(free, q, v)
     motion = flow(ld, x, p, intervals, force=True)
-    return Simulation(scene, free, motion, state.turns_made(scene.robot))
+    return Simulation(scene, free, motion, state.turns_made(scene.robot, motion.q[0]))
 
 
 def _drive(torque: Torque | Trajectory | Drive | None) -> Drive | None:

@@ -277,7 +277,7 @@ class TrajectoryProblem(ProblemSummary):
 
     def motion(self, path: DiscretePath, momenta: Array, metadata: dict[str, Any]) -> Trajectory:
         """A path on the grid as a trajectory; arguments as for Trajectory."""
-        turns = self.start.turns_made(self.coordinates)
+        turns = self.start.turns_made(self.coordinates, path.q[0])
         if self.ld.segments is not None and self.about_robot:
             segments = SegmentScenes(self.scenes, tuple(np.bincount(self.ld.segments).tolist()))
             return Trajectory(self.grid, path, momenta, None, metadata, None, segments, turns)

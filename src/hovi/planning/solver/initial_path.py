@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+import numpy as np
+import numpy.typing as npt
+
 from hovi.discrete.grid import DiscretePath
-from hovi.discrete.guess import check_path, stretched
+from hovi.discrete.guess import check_path, stretched, with_turns
 from hovi.discrete.node_continuity import require_continuous
+from hovi.discrete.state import State
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError
+from hovi.planning.problem.notation.whole_turns import says_turns, turns_after
 from hovi.planning.problem.problem import TrajectoryProblem
+
+Array = npt.NDArray[np.float64]
 
 
 def guess_path(problem: TrajectoryProblem, guess: str | Trajectory | DiscretePath) -> DiscretePath:
@@ -27,4 +34,21 @@ def guess_path(problem: TrajectoryProblem, guess: str | Trajectory | DiscretePat
             f"the guess has {guess.v.shape[1]} velocities, but {coordinates.owner} has "
             f"{coordinates.nv}; use a motion of the same one."
         )
-    return problem.path(stretched(guess, grid.duration, problem.ld.k))
+    curve, turns = stretched(guess, grid.duration, problem.ld.k), _turns_left(problem, guess)
+    if turns.any():
+        curve = with_turns(curve, coordinates, grid.duration, turns)
+    return problem.path(curve)
+
+
+def _turns_left(problem: TrajectoryProblem, guess: Trajectory) -> Array:
+    """Full turns of continuous joints by which a guess ends too early, shape (nv,).
+
+    They are known where the angle of the goal says its turns.
+    """
+    start, goal, on = problem.start, problem.goal, problem.coordinates
+    if not isinstance(goal, State) or not says_turns(goal, on).any():
+        return np.zeros(on.nv)
+    first, last = guess.positions([0.0, guess.duration])
+    q0, q1 = problem.end_jets[0] if problem.end_jets else problem.boundary[::2]
+    change = on.difference(q0, guess.q[0]) + last - first + on.difference(guess.q[-1], q1)
+    return turns_after(goal, start, on, q0, change)

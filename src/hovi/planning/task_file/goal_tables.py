@@ -22,6 +22,7 @@ from hovi.planning.task_file.messages import Keys, TomlText, spelled
 from hovi.planning.task_file.schema import EndTable, ViaTable
 from hovi.robot.robot import Robot
 from hovi.robot.space.joint_table import JointError, configuration_of, with_angles
+from hovi.robot.space.turns import turns_of
 
 _FREE = ("free", "free_velocity", "free_acceleration")
 
@@ -52,8 +53,8 @@ def read_end(
             chosen.check(robot)
             return chosen
         state = chosen.resolved(robot, name)
-        if isinstance(state.q, Mapping) and not state.turns_made(robot):  # q says all
-            state = replace(state, q=state.on(robot, name)[0])
+        if isinstance(state.q, Mapping) and not turns_of(state.angles_on(robot)).any():
+            state = replace(state, q=state.on(robot, name)[0])  # which says all
     except EndError as wrong:
         raise toml.error((*keys, *_key(wrong.key)), str(wrong)) from None
     except JointError as wrong:

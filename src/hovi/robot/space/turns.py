@@ -28,6 +28,11 @@ def nearest_angles(q: Array, near: Array, space: ConfigurationSpace) -> Array:
     return np.asarray(angles + 2 * np.pi * np.round((near - angles) / (2 * np.pi)))
 
 
+def known_or(angles: Array, others: Array) -> Array:
+    """The angles, and where they are NaN the others."""
+    return np.asarray(np.where(np.isnan(angles), others, angles))
+
+
 def turns_of(angles: Array) -> Array:
     """Full turns beyond the remainder in (-pi, pi], (...): 1 of 9.28 rad, which is 3 rad + 2 pi.
 

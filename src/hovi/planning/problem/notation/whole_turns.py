@@ -11,7 +11,7 @@ import numpy.typing as npt
 from hovi.discrete.state import MAX_TURNS, State
 from hovi.errors import InputError
 from hovi.robot.space.coordinates import Coordinates
-from hovi.robot.space.turns import remainder, turns_of
+from hovi.robot.space.turns import known_or, nearest_angles, remainder, turns_of
 
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
@@ -37,9 +37,8 @@ def turns_to(goal: State, start: State, on: Coordinates, stops: Sequence[Array])
             f"goal.turns: the goal of joint {on.joint_at(int(i))!r}, {angles[i]:g} rad, says its "
             "full turns: give an angle from -pi to pi, or leave out `turns`."
         )
-    changes = [on.difference(*pair) for pair in pairwise(stops)]
-    begun = remainder(stops[0], on.space) + 2 * np.pi * turns_of(start.angles_on(on))
-    further = np.round((angles - begun - np.sum(changes, axis=0)) / (2 * np.pi))
+    change = np.sum([on.difference(*pair) for pair in pairwise(stops)], axis=0)
+    further = turns_after(goal, start, on, stops[0], change)
     for i in np.flatnonzero(said & (abs(further) > MAX_TURNS)):
         raise InputError(
             f"the goal of joint {on.joint_at(int(i))!r}, {angles[i]:g} rad, is "
@@ -48,14 +47,25 @@ def turns_to(goal: State, start: State, on: Coordinates, stops: Sequence[Array])
     return np.asarray(np.where(said, further, added))
 
 
-def turns_missed(goal: State, on: Coordinates, reached: Array) -> str:
+def turns_after(goal: State, start: State, on: Coordinates, q: Array, change: Array) -> Array:
+    """Full turns up to the angles that a goal says after a change from the start, shape (nv,).
+
+    q: configuration (nq,) of the start. change: of the angles, shape (nv,), in [rad].
+    """
+    given = known_or(start.angles_on(on), remainder(q, on.space))
+    left = goal.angles_on(on) - nearest_angles(q, given, on.space) - change
+    return np.asarray(np.where(says_turns(goal, on), np.round(left / (2 * np.pi)), 0.0))
+
+
+def turns_missed(goal: State, on: Coordinates, reached: Array, free: Mask) -> str:
     """By how many full turns a motion misses the angle of its goal, as a clause; "" if none.
 
-    reached: the angles of the joints at its end, shape (nv,), in [rad].
+    reached: the angles of the joints at its end, shape (nv,), in [rad]. free: joints whose angles
+    are guesses, (nv,).
     """
     angles = goal.angles_on(on)
     away = np.round((reached - angles) / (2 * np.pi))
-    missed = np.where(says_turns(goal, on), away, 0.0)
+    missed = np.where(says_turns(goal, on) & ~free, away, 0.0)
     i = int(np.argmax(np.abs(missed)))
     if not missed.any():
         return ""

@@ -61,7 +61,8 @@ def _turns_missed(problem: TrajectoryProblem, motion: Trajectory) -> str:
     goal, on = problem.goal, problem.coordinates
     if not isinstance(goal, State) or not on.space.angles:
         return ""
-    return turns_missed(goal, on, motion.positions(motion.duration)[0])
+    free = np.asarray(problem.free_ends[:, 0].any(axis=0))
+    return turns_missed(goal, on, motion.positions(motion.duration)[0], free)
 
 
 def _exceeded(motion: Trajectory, limits: Limits) -> bool:
