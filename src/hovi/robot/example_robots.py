@@ -68,9 +68,23 @@ def example_robot(name: str) -> ExampleRobot:
 
 
 def build_in_code(name: str) -> tuple[pin.Model, pin.GeometryModel, pin.GeometryModel]:
-    """Model, visual and collision geometry of a robot of BUILT_IN_CODE."""
+    """Model, visual and collision geometry of a robot of BUILT_IN_CODE.
+
+    Its loader takes joints from the model and leaves their shapes.
+    """
     wrapper = _loader_class(name)().robot
-    return wrapper.model, wrapper.visual_model, wrapper.collision_model
+    model = wrapper.model
+    visual, collision = (_on(model, x) for x in (wrapper.visual_model, wrapper.collision_model))
+    return model, visual, collision
+
+
+def _on(model: pin.Model, geometry: pin.GeometryModel) -> pin.GeometryModel:
+    """The shapes that a model's joints carry."""
+    kept = pin.GeometryModel()
+    for shape in geometry.geometryObjects:
+        if shape.parentJoint < model.njoints:
+            kept.addGeometryObject(shape)
+    return kept
 
 
 def rotor_armature(model: pin.Model, srdf: Path) -> tuple[tuple[str, float], ...]:

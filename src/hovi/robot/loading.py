@@ -221,6 +221,18 @@ def with_locked(robot: Robot, positions: Mapping[str, float]) -> Robot:
     return Robot(robot.name, model, source, (kept[0], kept[1]))
 
 
+def _attach(geometry: pin.GeometryModel, model: pin.Model, name: str) -> None:
+    """Give shapes without a frame that of their joint. Raises ModelError for an unknown joint."""
+    for shape in geometry.geometryObjects:
+        if shape.parentJoint >= model.njoints:
+            raise ModelError(
+                f"shape {shape.name!r} is on joint {shape.parentJoint}, and model {name!r} has "
+                f"{model.njoints}: give the geometry that was built with this model."
+            )
+        if shape.parentFrame >= model.nframes:
+            shape.parentFrame = model.getFrameId(model.names[shape.parentJoint])
+
+
 def _from_model(
     model: pin.Model,
     name: str,
@@ -235,6 +247,8 @@ def _from_model(
             "accepted: lock joints with pinocchio.buildReducedModel first."
         )
     shapes = [shape.copy() for shape in given if shape is not None]
+    for shape in shapes:
+        _attach(shape, model, name)
     held = locked if isinstance(locked, Mapping) else dict.fromkeys(locked, 0.0)
     reduced, shapes = locked_model(model.copy(), shapes, held)
     queue = iter(shapes)
