@@ -29,8 +29,8 @@ def whole_file(path: str | os.PathLike[str], durable: bool = True) -> Iterator[B
 
     path: the file to write; an existing regular file is replaced and keeps its permissions. Of a
         symbolic link, the file to which it leads is written, and the link stays.
-    durable: whether it is waited for until file and name are on the disk, some ms; without, a crash
-        of the system may leave an empty or damaged file.
+    durable: whether the block ends only once file and name are on the disk, which takes some ms;
+        otherwise a crash of the system may leave an empty or damaged file.
     Raises OSError as the operating system does, and when `path` is a folder or a device, or no
     path at all.
     """

@@ -33,7 +33,8 @@ from hovi.robot.robot import Robot
 from hovi.robot.space.unwrapped_angles import shown_names
 from hovi.system.dataclass import dataclass
 from hovi.viewing.curves.colors import COLORS
-from hovi.viewing.curves.joint_panels import compared, joint_figure
+from hovi.viewing.curves.given_motion import motion_in, motions_in
+from hovi.viewing.curves.joint_panels import joint_figure
 from hovi.viewing.curves.scheme_torque import scheme_torque
 from hovi.viewing.curves.shown_figure import ShownFigure
 from hovi.viewing.distance_panel import draw_distances
@@ -93,7 +94,7 @@ def plot(
     compare: others of the same joints. Each joint has its panels then, with limits dashed.
     Raises DisplayError.
     """
-    motions = compared(trajectory, compare)
+    motions = [motion_in(trajectory), *motions_in(compare)]
     if len(motions) == 1:
         figure = motion_figure(motions[0])
     else:

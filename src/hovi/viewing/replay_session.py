@@ -11,19 +11,19 @@ import warnings
 import webbrowser
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Self
 
 from hovi.checks.arguments import check_arguments_except
 from hovi.discrete.output.caution import caution_lines, warn_of_cautions
 from hovi.discrete.trajectory import Trajectory
-from hovi.errors import DisplayError, InputError, expect
+from hovi.errors import DisplayError, expect
 from hovi.planning.problem.limits import as_limits
 from hovi.robot.robot import Robot
 from hovi.system.dataclass import dataclass
 from hovi.system.files import reason, whole_file
 from hovi.system.terminal import has_browser, terminal_script, wait_at_exit, wait_for_interrupt
 from hovi.viewing.animation import animation_of, frame_times
-from hovi.viewing.curves.given_motion import motion_in
+from hovi.viewing.curves.given_motion import motion_in, motions_in
 from hovi.viewing.drawing import drawn, ghost_color
 from hovi.viewing.highlights import AT_LIMIT_NOTE, Highlights
 from hovi.viewing.meshcat_page import Page, packed
@@ -174,7 +174,7 @@ def replay(
     Raises DisplayError when the page cannot be served, opened or written.
     """
     check_speed(speed)
-    trajectory, others = motion_in(trajectory), _motions(compare)
+    trajectory, others = motion_in(trajectory), motions_in(compare)
     if html is not None:
         return write_html(trajectory, html, compare=others, speed=speed, loop=loop, trace=trace)
     script = terminal_script()
@@ -303,20 +303,6 @@ def _panel(
         labels=tuple(zip(labels, colors, strict=False)),
         trace=trace,
     )
-
-
-def _motions(compare: Any) -> tuple[Trajectory, ...]:
-    if isinstance(compare, Trajectory) or hasattr(compare, "trajectory"):
-        return (motion_in(compare),)
-    try:
-        motions = tuple(getattr(each, "trajectory", each) for each in compare)
-    except TypeError as error:
-        raise InputError(
-            f"compare must be a list of trajectories, got {type(compare).__name__}."
-        ) from error
-    for each in motions:
-        expect(each, Trajectory, "a list of trajectories to compare with")
-    return motions
 
 
 def _robot(trajectory: Trajectory) -> Robot:

@@ -1,4 +1,4 @@
-"""Convex hulls of mesh files, kept in the user's cache folder by the content of the file."""
+"""Convex hulls of mesh files, cached in the user's folder by the content of the file."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import numpy.typing as npt
 from hovi.errors import ModelError
 from hovi.planning.obstacles.hull import hull_of
 from hovi.robot.meshes.mesh_shape import scaled_triangles
-from hovi.system.kept_files import keep, kept
+from hovi.system.file_cache import read_cached, write_cached
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.int32]
@@ -26,22 +26,21 @@ _CORNERS = np.dtype("<i4")
 
 
 def mesh_hull(path: Path, content: bytes, scale: Sequence[float]) -> coal.ConvexBase:
-    """The convex hull of a mesh after scaling, shape by shape the same from the cache.
+    """The convex hull of a mesh after scaling, the same whether it is cached or computed.
 
     path: of the file, for its type and messages. content: its bytes. scale: three factors.
     Raises ModelError for a mesh that cannot be used, or spans no volume.
     """
     digest = _digest(path.suffix.lower().encode(), np.array(scale, _POINTS).tobytes(), content)
-    name = digest.hex()
-    found = kept("hulls", name)
-    hull = None if found is None else _unpacked(found, digest)
+    cached = read_cached("hulls", digest.hex())
+    hull = None if cached is None else _unpacked(cached, digest)
     if hull is None:
         hull = hull_of(scaled_triangles(path, content, scale).vertices)
         if hull is None:
             raise ModelError(
                 f"mesh {path.name!r} has no convex hull: use a mesh with volume, or a primitive."
             )
-        keep("hulls", name, _packed(hull, digest))
+        write_cached("hulls", digest.hex(), _packed(hull, digest))
     return hull
 
 

@@ -21,7 +21,7 @@ from hovi.errors import InputError
 from hovi.planning.obstacles.hull import hull_of
 from hovi.planning.obstacles.triangle_mesh import TriangleMesh
 from hovi.system.deadline import raise_if_late, time_left
-from hovi.system.kept_files import keep, kept
+from hovi.system.file_cache import read_cached, write_cached
 
 Array = npt.NDArray[np.float64]
 Parts = tuple[Array, ...]
@@ -42,11 +42,11 @@ def convex_parts(mesh: TriangleMesh) -> Parts:
     Raises InputError without CoACD, and for a mesh that it cannot divide.
     """
     name = f"{_KEY}-{mesh.digest}.npz"
-    content = kept("convex_parts", name)
-    parts = None if content is None else _unpacked(content)
+    cached = read_cached("convex_parts", name)
+    parts = None if cached is None else _unpacked(cached)
     if parts is None:
         parts = _divided(mesh)
-        keep("convex_parts", name, _packed(parts))
+        write_cached("convex_parts", name, _packed(parts))
     return parts
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterable
 from typing import Any
 
 from hovi.discrete.trajectory import Trajectory
@@ -20,3 +21,12 @@ def motion_in(given: Any) -> Trajectory:
     expect(motion, Trajectory, "the trajectory of a solution")
     assert isinstance(motion, Trajectory)
     return motion
+
+
+def motions_in(given: Any) -> list[Trajectory]:
+    """The trajectories of a list of motions, or of a single one. Raises InputError."""
+    if isinstance(given, str | os.PathLike | Trajectory) or hasattr(given, "trajectory"):
+        given = (given,)
+    if not isinstance(given, Iterable):
+        raise InputError(f"compare must be a list of motions, got {type(given).__name__}.")
+    return [motion_in(each) for each in given]

@@ -9,11 +9,9 @@ import numpy.typing as npt
 from matplotlib.axes import Axes
 
 from hovi.discrete.trajectory import Trajectory
-from hovi.errors import DisplayError, InputError
+from hovi.errors import DisplayError
 from hovi.planning.problem.limits import KINDS, Limits
-from hovi.planning.solver.solver import Solution
 from hovi.viewing.curves.colors import COLORS
-from hovi.viewing.curves.given_motion import motion_in
 from hovi.viewing.curves.shown_figure import ShownFigure
 
 Array = npt.NDArray[np.float64]
@@ -25,17 +23,6 @@ _COLUMNS = (
     ("v", ("velocity [rad/s]", "velocity [m/s]")),
     ("tau", ("torque [N m]", "force [N]")),
 )
-
-
-def compared(
-    motion: Trajectory | Solution, others: Sequence[Trajectory | Solution]
-) -> list[Trajectory]:
-    """The motions to plot. Raises InputError."""
-    if isinstance(others, Trajectory | Solution):
-        others = (others,)
-    if not isinstance(others, Sequence):
-        raise InputError(f"compare must be a list of motions, got {type(others).__name__}.")
-    return [motion_in(each) for each in (motion, *others)]
 
 
 def joint_figure(

@@ -1,7 +1,7 @@
-"""Files in the user's cache folder: what takes long to compute, kept for the next process.
+"""Files in the user's cache folder: what takes long to compute, for the next process.
 
 A file is read only where nobody else could have written it, and nothing depends on its being there:
-without a home folder, on a full disk or in a folder of somebody else's, nothing is kept.
+without a home folder, on a full disk or in a folder of somebody else's, nothing is cached.
 """
 
 from __future__ import annotations
@@ -14,27 +14,27 @@ from hovi.system.cache_home import cache_home
 from hovi.system.files import whole_file
 from hovi.system.private_folder import UnsafeFolderError, is_private_file, private_folder
 
-MAX_KEPT_BYTES = 64_000_000
+MAX_BYTES = 64_000_000
 """Largest file that is read."""
 
 
-def kept(kind: str, name: str) -> bytes | None:
+def read_cached(kind: str, name: str) -> bytes | None:
     """The content of hovi/kind/name in the cache folder; None if there is none to trust."""
     try:
         file = _folder(kind) / name
         with os.fdopen(os.open(file, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK), "rb") as stream:
             if not is_private_file(stream.fileno()):
                 return None
-            content = stream.read(MAX_KEPT_BYTES + 1)
+            content = stream.read(MAX_BYTES + 1)
     except (UnsafeFolderError, OSError, RuntimeError):
         return None
-    return content if len(content) <= MAX_KEPT_BYTES else None
+    return content if len(content) <= MAX_BYTES else None
 
 
-def keep(kind: str, name: str, content: bytes) -> None:
+def write_cached(kind: str, name: str, content: bytes) -> None:
     """Put hovi/kind/name into the cache folder in one step, if it can be written at all.
 
-    It is not waited for until it is on the disk: a file that a crash leaves damaged is made again.
+    The file may not be on the disk yet: readers have to notice one that a crash left damaged.
     """
     with suppress(UnsafeFolderError, OSError, RuntimeError):
         file = _folder(kind) / name
