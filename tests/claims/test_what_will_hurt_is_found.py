@@ -122,7 +122,7 @@ FAULTS: dict[str, tuple[str, str, str, set[str]]] = {
 
 def written(folder: Path, text: str, mesh_folder: str = "shapes") -> list[str]:
     """The arguments of the command for a file with this text, after its mesh was written."""
-    (folder / "robot").mkdir()
+    (folder / "robot").mkdir(parents=True)
     (folder / mesh_folder).mkdir(parents=True)
     (folder / mesh_folder / "a.off").write_text(CUBE)
     file = folder / "robot" / "arm.urdf"
@@ -308,7 +308,10 @@ def test_what_is_no_robot_gets_one_sentence(
 ) -> None:
     arguments = written(tmp_path, GOOD.replace('lower="-2"', 'lower="4"'))
     (tmp_path / "m.npz").write_bytes(b"")
-    for given in (arguments, [str(tmp_path / "none.urdf")], [str(tmp_path / "m.npz")]):
+    good = written(tmp_path / "good", GOOD)
+    (tmp_path / "broken.srdf").write_text("<robot><disable_collisions/></robot>")
+    with_srdf = [*good, "--srdf", str(tmp_path / "broken.srdf")]
+    for given in (with_srdf, arguments, [str(tmp_path / "none.urdf")], [str(tmp_path / "m.npz")]):
         assert main(["doctor", *given]) == 2
         told = capsys.readouterr()
         assert told.out == ""

@@ -25,9 +25,13 @@ _NAMED = re.compile(r"(\w+)\[@name=(['\"].*?['\"])\]")
 
 
 def findings_of(robot: Robot, model: pin.Model | None = None) -> tuple[Finding, ...]:
-    """What will hurt about a robot, the worst first. model: its own unless a scene has rotors."""
+    """What will hurt about a robot, the worst first. model: its own unless a scene has rotors.
+
+    Raises ModelError for an SRDF that cannot be read.
+    """
     from hovi.robot.file_findings import file_findings, in_order
 
+    _ = robot.poses  # reads the SRDF
     found = file_findings(model or robot.model, robot.source, robot.tip_frames)
     has_shapes = all(each.kind not in ("mesh", "mesh-unit") for each in found)
     if has_shapes and not robot.unplanned_joints:
