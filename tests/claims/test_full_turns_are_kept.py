@@ -115,6 +115,8 @@ def test_goals_are_reached_at_their_angle(
         reached = integrated(found.trajectory, np.array([0.0, 4.0]), [start, 0.1, 0.0])[-1]
         np.testing.assert_allclose(found.trajectory.positions(4.0)[0], reached, atol=1e-3)
         np.testing.assert_allclose(reached[:2], [end, 0.4], atol=1e-3)
+        farther = abs(end - start) > np.pi
+        assert ("beyond the shortest way, as its goal" in found.message) == farther
         assert np.cos(reached[2] - 0.3) == pytest.approx(1.0)
 
 

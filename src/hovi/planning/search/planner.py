@@ -21,7 +21,7 @@ from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.goals import Via
 from hovi.planning.problem.notation.ends import End, as_end
 from hovi.planning.problem.notation.smoothing import smoothed
-from hovi.planning.problem.notation.whole_turns import says_turns
+from hovi.planning.problem.notation.whole_turns import says_turns, turns_sentence
 from hovi.planning.problem.presolve.assumptions import assumptions
 from hovi.planning.problem.presolve.findings import findings
 from hovi.planning.problem.presolve.length_slips import grasped_slips
@@ -198,6 +198,9 @@ def with_notes(
     """
     notes = [*_notes(found, scenes, options), *apart.cautions(found)]
     said = [each.sentence for each in notes if each.word in (LEFT_OUT, COLLISION)]
+    if found.problem is not None and isinstance(goal := found.problem.goal, State):
+        turned = turns_sentence(goal, found.problem.coordinates, found.problem.turns)
+        said += [turned] if turned else []
     cautions = notes if found.success else [Caution(STATUS, found.message), *notes]
     setup = found.setup_seconds if setup_seconds is None else setup_seconds
     message = " ".join([found.message, *said])

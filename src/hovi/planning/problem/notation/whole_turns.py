@@ -57,6 +57,25 @@ def turns_after(goal: State, start: State, on: Coordinates, q: Array, change: Ar
     return np.asarray(np.where(says_turns(goal, on), np.round(left / (2 * np.pi)), 0.0))
 
 
+def turns_sentence(goal: State, on: Coordinates, turns: Array) -> str:
+    """That angles of a goal ask for more than the shortest way, as a sentence; "" if none does.
+
+    turns: beyond the shortest way, shape (nv,): see `turns_to`.
+    """
+    joints = np.flatnonzero(says_turns(goal, on) & (turns != 0))
+    if not len(joints):
+        return ""
+    i, more = int(joints[0]), f", and {len(joints) - 1} more" if len(joints) > 1 else ""
+    return (
+        f"Joint {on.joint_at(i)!r}{more} goes {_in_words(turns[i])} beyond the shortest way, as "
+        f"its goal {goal.angles_on(on)[i]:g} rad says; an angle from -pi to pi says none."
+    )
+
+
+def _in_words(turns: float) -> str:
+    return "a full turn" if abs(turns) == 1 else f"{abs(turns):.0f} full turns"
+
+
 def turns_missed(goal: State, on: Coordinates, reached: Array, free: Mask) -> str:
     """By how many full turns a motion misses the angle of its goal, as a clause; "" if none.
 
@@ -69,5 +88,4 @@ def turns_missed(goal: State, on: Coordinates, reached: Array, free: Mask) -> st
     i = int(np.argmax(np.abs(missed)))
     if not missed.any():
         return ""
-    turns = "a full turn" if abs(missed[i]) == 1 else f"{abs(missed[i]):.0f} full turns"
-    return f"ends {turns} from the goal of {on.joint_at(i)!r}, {angles[i]:g} rad"
+    return f"ends {_in_words(missed[i])} from the goal of {on.joint_at(i)!r}, {angles[i]:g} rad"
