@@ -486,7 +486,8 @@ def test_a_study_goes_into_a_folder_that_is_a_thousand_deep(
 ) -> None:
     (tmp_path / "study.toml").write_text('scene = "two_link_reach"\n')
     code, _, err = run("study", tmp_path / "study.toml", "--out", deep, "--workers", "1")
-    assert (code, err) == (0, "")
+    assert code == 0
+    assert not re.search("error|warning|note", err)  # on a slow machine it shows its progress
     assert (deep / "plans.parquet").exists()
 
 
