@@ -83,9 +83,9 @@ class DisplayError(HoviError):
 
 
 def shows_all_frames() -> bool:
-    """Whether errors keep all frames of hovi in their tracebacks, for who works on hovi.
+    """Whether errors keep all frames of hovi in their tracebacks, for people who work on hovi.
 
-    Otherwise one is left, that of the public function, below the line that called it.
+    Otherwise one is left, that of the public function, below the line that calls it.
     """
     return os.environ.get("HOVI_TRACEBACK") == "full"
 

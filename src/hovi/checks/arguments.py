@@ -2,7 +2,7 @@
 
 Misuse is refused before anything is computed, in one sentence: the argument, what it must be, and
 what was given. Shapes and values are checked by each function itself. A HoviError leaves such a
-function without the frames below it, which say nothing to who called it: see `shows_all_frames`.
+function without the frames below it, which say nothing to the caller: see `shows_all_frames`.
 """
 
 from __future__ import annotations

@@ -55,7 +55,7 @@ def beside(file: Path, suffix: str) -> Path:
 def load_shown(
     path: Path, package_dirs: Sequence[Path] | None = None, warned: bool = True
 ) -> Trajectory:
-    """The same, after its cautions on stderr.
+    """A motion as `load_trajectory` reads it, after its cautions are printed on stderr.
 
     package_dirs: folders with the packages of its robot's meshes.
     warned: whether hovi warns of those against executing the motion when it is shown.

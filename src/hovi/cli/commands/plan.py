@@ -152,14 +152,13 @@ def _limits(given: str) -> str | dict[str, Any]:
     import tomllib
 
     from hovi.errors import InputError, nearest
-    from hovi.planning.problem.arms.limit_set import NAMES
+    from hovi.planning.problem.limits import NAMES
 
-    names = "urdf", "soft", "none", *NAMES
-    if given in names:
+    if given in NAMES:
         return given
     if not given.lstrip().startswith("{"):
         raise InputError(
-            f"--limits {given!r}: {nearest(given, names)} Give other limits as a table such as "
+            f"--limits {given!r}: {nearest(given, NAMES)} Give other limits as a table such as "
             "\"{v = '50 %'}\", or in the scene file."
         )
     try:

@@ -44,8 +44,9 @@ _OTHER_POSES = {
 """What to write for numbers of another shape than that of a pose."""
 LEAST_LENGTH = 1e-6
 """Smallest length of an axis."""
-ROUNDING = 2e-3
-"""Largest deviation of a rotation matrix from orthonormality, as that of three digits."""
+EXACT, ROUNDED = 1e-12, 2e-3
+"""Largest entries of R^T R - 1 of a rotation that is taken as it is, and of one whose entries are
+rounded to three digits, for which the nearest rotation is taken."""
 
 
 def _check_names(owner: type[Owner]) -> type[Owner]:
@@ -304,9 +305,9 @@ def _direction(value: npt.ArrayLike) -> Array:
 
 def _rotation(value: npt.ArrayLike) -> Array:
     matrix = _numbers("rotation", value)
-    fits = matrix.shape == (3, 3) and (np.abs(matrix) <= 1 + ROUNDING).all()
+    fits = matrix.shape == (3, 3) and (np.abs(matrix) <= 1 + ROUNDED).all()
     off = float(np.max(np.abs(matrix.T @ matrix - np.eye(3)))) if fits else np.inf
-    if off > ROUNDING:
+    if off > ROUNDED:
         found = f", and is off by {off:.2g}" if fits else ""
         raise InputError(
             "the rotation of a frame goal must be an orthonormal (3, 3) matrix, to three digits"
@@ -314,8 +315,10 @@ def _rotation(value: npt.ArrayLike) -> Array:
         )
     if np.linalg.det(matrix) < 0:
         raise InputError("the rotation of a frame goal is a reflection; reverse one of its axes.")
+    if off <= EXACT:
+        return matrix
     left, _, right = np.linalg.svd(matrix)
-    return matrix if off <= 1e-12 else np.asarray(left @ right)
+    return np.asarray(left @ right)
 
 
 def _norm(x: npt.ArrayLike) -> float:

@@ -30,8 +30,8 @@ Range = tuple[Array, Array]
 
 KINDS = tuple(KIND_NAMES)
 """The limited quantities, in the order of the rows of Limits."""
-URDF_NAMES = "urdf", "soft"
-"""Limits that the URDF states."""
+NAMES = "urdf", "soft", "none", *ARMS
+"""Limits that have a name."""
 FIRST_KINDS = len(KINDS) - len(OF_ORDER_3)
 """Number of those that motions of order 2 have; the others, which come last, need order 3."""
 UNBOUNDED = 1e15
@@ -330,11 +330,11 @@ def as_limits(
     for key in limits:
         if key not in keys:
             raise InputError(f"unknown key `limits.{key}`; {nearest(str(key), keys)}")
-    own = entries(coordinates, "q", limits.get("q", {}))
-    base = _by_name(coordinates, limits.get("base", "urdf"), order, own)
+    name, own = limits.get("base", "urdf"), entries(coordinates, "q", limits.get("q", {}))
+    base = _by_name(coordinates, name, order, own)
     if not limits.keys().isdisjoint(OF_ORDER_3):
         base = _with_all_kinds(base)
-    lower, upper, name = base.lower.copy(), base.upper.copy(), limits.get("base", "urdf")
+    lower, upper = base.lower.copy(), base.upper.copy()
     for row, kind in enumerate(base.kinds):
         of = Base(name, base.lower[row], base.upper[row])
         for i, pair in entries(coordinates, kind, limits.get(kind, {}), of).items():
@@ -360,14 +360,13 @@ def _warned_of_degrees(coordinates: Coordinates, limits: Limits) -> Limits:
 
 
 def _by_name(coordinates: Coordinates, name: Any, order: int, own: Collection[int]) -> Limits:
-    """Limits that have a name. own: coordinates whose positions are bounded otherwise."""
+    """Limits that have a name. own: indices in v of joints whose ranges the user gives."""
     if name == "none":
         return no_limits(coordinates)
     if is_limit_set(name):
         return _of_arm(coordinates, name, order)
-    if name not in URDF_NAMES:
-        known = (*URDF_NAMES, "none", *ARMS)
-        hint = f": {nearest(name, known)}" if isinstance(name, str) else "."
+    if name not in ("urdf", "soft"):
+        hint = f": {nearest(name, NAMES)}" if isinstance(name, str) else "."
         raise InputError(
             "limits are 'urdf', 'soft', 'none', the name of an arm or given by kind, not "
             f"{name!r}{hint}"

@@ -9,14 +9,11 @@ import numpy as np
 from pydantic import ValidationError
 
 from hovi.errors import InputError, nearest
-from hovi.planning.problem.arms.limit_set import NAMES as ARMS
-from hovi.planning.problem.limits import KINDS, URDF_NAMES, Limits, as_limits
+from hovi.planning.problem.limits import KINDS, NAMES, Limits, as_limits
 from hovi.planning.task_file.effect_tables import plain
 from hovi.planning.task_file.messages import Keys, TomlText, first_sentence, in_toml, spelled
 from hovi.planning.task_file.schema import LimitsTable
 from hovi.robot.robot import Robot
-
-NAMES = (*URDF_NAMES, "none", *ARMS)
 
 
 def read_limits(
@@ -80,7 +77,7 @@ def _check_kind(
 
 
 def _alone(limits: Mapping[str, Any], kind: str, given: Any) -> dict[str, Any]:
-    """Limits of a kind without others; shares need the base, and the positions that it may need."""
+    """A table with one kind of limits; shares also need the base, and the ranges it may lack."""
     parts = list(given.values()) if isinstance(given, dict) else given
     parts = parts if isinstance(parts, list) else [parts]
     if kind == "q" or not any(isinstance(each, str) for each in parts):

@@ -28,7 +28,7 @@ class Plans:
 
     folder: of the study. columns: of plans.parquet, by name, as lists. parameters: names of those
     that vary. seconds: that each plan took, by key; of the last run that did it.
-    finished: False for plans of a run that goes on or was killed, whose cells are not known.
+    finished: False while a run goes on and after it was killed; cells and parameters are not known.
     """
 
     folder: Path
@@ -39,7 +39,7 @@ class Plans:
 
     @classmethod
     def read(cls, folder: Path) -> Plans:
-        """The plans of a folder, those so far where its run has not ended. Raises StudyError."""
+        """The plans of a folder; those so far if its run has not ended. Raises StudyError."""
         require_extra("pyarrow", "study")
         if in_use(folder) or not names_file(folder / PLANS):
             index = Index(folder)
@@ -58,8 +58,8 @@ class Plans:
     def _so_far(cls, folder: Path, index: Index) -> Plans:
         """The plans of the journals, without the parameters of their cells."""
         keys = index.keys()
-        done = {key: index.done(key) for key in keys}
-        rows = [each.row.to_dict() for each in done.values() if each is not None]
+        done = {key: each for key in keys if (each := index.done(key)) is not None}
+        rows = [each.row.to_dict() for each in done.values()]
         columns = {each.name: [row[each.name] for row in rows] for each in fields(PlanRow)}
         columns |= {"key": list(done), "cell": [None] * len(rows)}
         taken = {run["key"]: run["seconds"] for run in index.runs() if run.get("seconds")}

@@ -16,7 +16,7 @@ SHOWN = ("cost", "error_estimate", "nit", "margin", "least_distance", "seconds")
 def summary(plans: Plans) -> dict[str, Any]:
     """JSON-compatible data: counts by status and caution, quantiles of columns of minima.
 
-    finished is False where there are the plans of a run that goes on or was killed.
+    finished: as of Plans.
     """
     success = plans.success
     quantiles = {}

@@ -18,8 +18,8 @@ class PlanRow:
 
     status: of the Solution, or one of the words above. success, reason: of the Solution.
     warnings: what was warned of, in one text. cautions: of the motion, each after its word and a
-        colon; None of a plan by an earlier version. excused: which limits the start exceeds, each
-        as a text; None likewise.
+        colon. excused: which limits the start exceeds, each as a text. Both are None in plans by
+        earlier versions.
     cost, effort, error_estimate, nit, n_neg: of the Solution.
     duration: of the motion, in [s]. intervals: of its grid.
     peak_v, peak_a, peak_tau: largest |v|, |a| and |tau| of each joint.
