@@ -84,7 +84,7 @@ def met_sentence(motion: Trajectory, overlap: HullOverlap) -> str:
     t = np.linspace(0.0, motion.duration, SAMPLES)
     q = motion.configurations(t)
     links = _GivenLinks.of(robot, *overlap.links)
-    for k in np.flatnonzero(_hulls(robot, overlap.links, q) <= 0.0):
+    for k in np.flatnonzero(_hull_distances(robot, overlap.links, q) <= 0.0):
         if links.distance(q[k]) == 0.0:
             first, second = overlap.links
             return (
@@ -93,8 +93,8 @@ def met_sentence(motion: Trajectory, overlap: HullOverlap) -> str:
     return ""
 
 
-def _hulls(robot: Robot, links: tuple[str, str], q: Array) -> Array:
-    """Distances of the convex hulls of two links at configurations (P, nq), exact below 0."""
+def _hull_distances(robot: Robot, links: tuple[str, str], q: Array) -> Array:
+    """Distances of two links' hulls at configurations (P, nq), in [m]; -inf if not a known pair."""
     distances = distances_between(robot, Clearance(self_collision=True))
     pairs = [frozenset((pair.link, pair.other)) for pair in distances.pairs]
     if frozenset(links) not in pairs:
@@ -106,8 +106,12 @@ def _hulls(robot: Robot, links: tuple[str, str], q: Array) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class _Given:
-    """A shape of a link as it was given. corners: of its triangles, (M, 3, 3); None without."""
+class _GivenShape:
+    """A shape of a link as it was given.
+
+    joint: index of the one that moves it. placement: relative to that joint.
+    corners: of a mesh's triangles, (M, 3, 3), in [m]; None for another shape.
+    """
 
     joint: int
     placement: pin.SE3
@@ -139,20 +143,21 @@ class _GivenLinks:
     """The shapes of two links as they were given."""
 
     robot: Robot
-    first: list[_Given]
-    second: list[_Given]
+    first: list[_GivenShape]
+    second: list[_GivenShape]
 
     @classmethod
     def of(cls, robot: Robot, *links: str) -> _GivenLinks:
         """Those of a robot's links by name."""
         geometry = robot.collision
         assert geometry is not None
-        found: dict[str, list[_Given]] = {name: [] for name in links}
+        found: dict[str, list[_GivenShape]] = {name: [] for name in links}
         for each in geometry.geometryObjects:
             name = str(robot.model.frames[each.parentFrame].name)
             if name in found:
-                known = each.parentJoint, each.placement, each.geometry, _corners(each.geometry)
-                found[name].append(_Given(*known))
+                shape = each.geometry
+                of_link = _GivenShape(each.parentJoint, each.placement, shape, _corners(shape))
+                found[name].append(of_link)
         return cls(robot, *(found[name] for name in links))
 
     def distance(self, q: Array) -> float:
@@ -164,7 +169,7 @@ class _GivenLinks:
 
 
 def _distance(
-    first: _Given, at: coal.Transform3s, second: _Given, there: coal.Transform3s
+    first: _GivenShape, at: coal.Transform3s, second: _GivenShape, there: coal.Transform3s
 ) -> float:
     overlap, result = coal.CollisionResult(), coal.DistanceResult()
     if coal.collide(first.shape, at, second.shape, there, coal.CollisionRequest(), overlap):
@@ -175,7 +180,9 @@ def _distance(
     return float(max(result.min_distance, 0.0))
 
 
-def _contains(mesh: _Given, at: coal.Transform3s, other: _Given, there: coal.Transform3s) -> bool:
+def _contains(
+    mesh: _GivenShape, at: coal.Transform3s, other: _GivenShape, there: coal.Transform3s
+) -> bool:
     """Whether a point of another shape is in a closed mesh, whose triangles alone Coal looks at.
 
     By the winding number: the solid angles of the triangles sum to 4 pi inside.

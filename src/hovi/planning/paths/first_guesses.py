@@ -28,7 +28,7 @@ class FirstGuesses:
     """A direct guess, how deep in obstacles it is, in [m], and guesses along paths around them.
 
     further: draws other paths, where there are any. branches: guesses to other configurations at
-    the goal. isolated: whether these, and that of the direct guess, are free to move nowhere.
+    the goal. isolated: whether these, and that of the direct guess, are isolated there.
     """
 
     direct: DiscretePath

@@ -28,11 +28,10 @@ from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 
-
 MET = 1e-6
-"""Largest distance [m] and angle [rad] by which a configuration that meets a goal misses it."""
+"""Largest distance, in [m], and angle, in [rad], between a goal and a frame that satisfies it."""
 FULL_RANK = 1e-6
-"""Least singular value of a goal's equations, relative to all, in an isolated configuration."""
+"""Least singular value of a goal's Jacobian at an isolated configuration, relative to its norm."""
 
 
 @check_arguments_except("time", "goal")
@@ -118,9 +117,9 @@ def goal_state(
 
 
 def held_goal(goal: FrameGoal, robot: Robot, q: Array, free: Sequence[str] = ()) -> State | None:
-    """A goal of a frame as the state that meets it at q, (nq,); None if it does not.
+    """The state at q, (nq,), that satisfies a goal of a frame; None if q does not.
 
-    free: joints that are free there where they do not move the frame.
+    free: joints that are free in it if they do not move the frame.
     """
     if max(goal.miss(robot, q)) > MET:
         return None
@@ -130,7 +129,7 @@ def held_goal(goal: FrameGoal, robot: Robot, q: Array, free: Sequence[str] = ())
 
 
 def is_isolated(goal: FrameGoal, robot: Robot, q: Array) -> bool:
-    """Whether no other configurations beside q, (nq,), meet a goal: its Jacobian has full rank."""
+    """Whether q, (nq,), alone satisfies a goal nearby: the goal's Jacobian has full column rank."""
     moves = moves_frame(robot.model, goal.frame)
     J = _condition(robot, goal).evaluate(q, np.zeros(robot.nv))[1][:, 0, moves]
     return bool(np.linalg.matrix_rank(J, tol=FULL_RANK * np.linalg.norm(J)) == moves.sum())

@@ -11,7 +11,6 @@ each of these motions is free to move.
 from __future__ import annotations
 
 import dataclasses
-import operator
 from collections.abc import Iterator, Sequence
 
 import numpy as np
@@ -70,7 +69,7 @@ class Ends:
 
     start, goal: of the plan; a goal of a frame has the branch as its guess.
     motions: between pairs of branches, on a few intervals, the cheapest first; none where nothing
-        was compared.
+        was compared. choice: from which they come; None likewise.
     """
 
     start: State
@@ -93,10 +92,10 @@ class Ends:
         return tuple(each for each in self.motions if each.pair.start is self.start)
 
     def cheaper_clear(self, cost: float, deadline: Deadline) -> Ends | None:
-        """The ends of the cheapest motion that keeps links apart and clear of obstacles.
+        """The ends between which a motion clear of obstacles and of the robot itself costs least.
 
-        cost: of the motion between these ends that does. deadline: of the whole plan.
-        None if none is found but between these ends, or dearer ones.
+        None if no such motion is found that costs less than the known one between these ends.
+        cost: of that one; infinite without one. deadline: of the whole plan.
         """
         if self.choice is None:
             return None
@@ -200,10 +199,11 @@ class _Choice:
         return Ends(best.start, self._goal_at(best.q), motions, self)
 
     def clear(self, motions: Sequence[_Motion], cost: float) -> _Motion | None:
-        """The cheapest of motions when they keep clear, if it is cheaper than the first of them.
+        """The cheapest of motions once they are clear; None if none costs less than `cost`.
 
-        motions: the cheapest first. They cost no less for keeping clear, so that dearer ones than
-        the best are not solved for. cost: known of the first, taken where it is not found here.
+        motions: the cheapest first. Clear ones cost no less, so that the search ends at the first
+        that is dearer than the best. cost: of a clear motion like the first, unless it is found
+        again here.
         """
         best = None
         try:
@@ -219,7 +219,7 @@ class _Choice:
         return best
 
     def _clear(self, motion: _Motion) -> _Motion:
-        """A motion between the same ends that keeps clear."""
+        """A motion between the same ends that is clear of obstacles and of the robot itself."""
         problem = self._problem(motion.pair, clear=True)
         guess = guess_path(problem, motion.found.trajectory)
         found = solve_on_grid(problem, guess, max_iterations=STEPS, barrier=LAST_BARRIER)
@@ -290,7 +290,7 @@ class _Choice:
                         found[number] = motion
         except (OutOfTimeError, HoviError):
             pass
-        return tuple(sorted(found.values(), key=_rank))
+        return tuple(sorted(found.values(), key=lambda each: each.rank))
 
     def _guesses(self, pairs: list[_Pair]) -> Iterator[tuple[int, Curve | None]]:
         """Numbers of pairs and guesses, None for the cubic: those first that promise most."""
@@ -315,7 +315,7 @@ class _Choice:
         yield from ((chosen[i], None) for i in order)
 
     def _promising(self, pairs: list[_Pair], most: int) -> list[int]:
-        """So many pairs: the ones without further turns, and the cheapest cubics of others."""
+        """Up to `most` pairs: those without further turns, and the cheapest cubics of others."""
         lagrangian = self.scene.effort_lagrangian(self.options.weight)
         q0, q1 = self._configurations(pairs)
         cost = cubic_costs(lagrangian, self.scene.robot, q0, q1, self.duration)
@@ -332,7 +332,7 @@ class _Choice:
     def _problem(self, pair: _Pair, clear: bool = False) -> TrajectoryProblem:
         """The motion between two ends on a few intervals, within the limits.
 
-        clear: whether it keeps links apart and clear of obstacles.
+        clear: whether it is clear of obstacles and of the robot itself.
         """
         scheme = of_order(by_name("galerkin-2"), self.scene.order)
         grid = Grid.uniform(self.duration, INTERVALS, scheme)
@@ -347,6 +347,3 @@ class _Choice:
 
 
 _WITHOUT_MOTION = Status.INFEASIBLE, Status.DIVERGED
-
-
-_rank = operator.attrgetter("rank")

@@ -130,9 +130,9 @@ class Job:
         return dataclasses.replace(self, options=self.options.with_changes(**changes))
 
     def held_at(self, q: Array) -> State | None:
-        """The goal of a frame as the state that meets it at q, (nq,).
+        """The state at q, (nq,), that satisfies the goal of a frame.
 
-        None for another kind of goal, a q that does not meet it, or where passive joints move.
+        None for another kind of goal, a q that does not satisfy it, and scenes with passive joints.
         """
         if not isinstance(self.goal, FrameGoal) or self.scene.passive:
             return None
@@ -140,7 +140,7 @@ class Job:
 
     @property
     def isolated(self) -> bool:
-        """Whether the end of its motion may move nowhere from the goal's guess."""
+        """Whether the guess of its goal, of a frame, is an isolated configuration there."""
         goal = self.goal
         if not isinstance(goal, FrameGoal) or goal.guess is None or self.scene.passive:
             return False

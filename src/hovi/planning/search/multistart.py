@@ -274,8 +274,8 @@ def _from_path_or_direct(pool: Pool, first: FirstGuesses, progress: Progress) ->
         if ended or (closer and len(tried) > 1):  # the direct guess is tried in any case
             break
     minima = distinct(tried)
-    held = next(at for each, at in zip(tried, goals, strict=True) if each is minima[0])
-    return Exploration(minima, len(tried), stopped, (), first, tuple(by_path), held)
+    goal = next(at for each, at in zip(tried, goals, strict=True) if each is minima[0])
+    return Exploration(minima, len(tried), stopped, (), first, tuple(by_path), goal)
 
 
 @dataclass(frozen=True, eq=False)
@@ -294,10 +294,10 @@ class _Attempt:
 
 
 def _attempts(first: FirstGuesses, rows: bool, job: Job) -> Iterator[_Attempt]:
-    """Solves from the guesses, with the end held where it may move nowhere.
+    """Solves from the guesses, with the end held in isolated configurations.
 
-    A solve whose end is free may slide along its equations and end without a motion, so that the
-    first branch is tried with its end held in any case.
+    A free end may slide along the goal's equations until the solve fails, so that the first branch
+    is tried with its end held in any case.
     """
     for attempt in _free_attempts(first, rows):
         to_branch = attempt.guess is first.all[0] and not attempt.by_path

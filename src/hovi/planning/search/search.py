@@ -213,8 +213,8 @@ class Search:
             self.progress("comparing with a finer grid", 0.95)
         for i, solution in enumerate(found[:MAX_REFINED]):
             problem = solution.problem or on_grid_of(self.fine.problem(), solution)
-            after = resolved(known := dataclasses.replace(solution, problem=problem))
-            after = self._at_finer_tolerances(known, after)
+            known = dataclasses.replace(solution, problem=problem)
+            after = self._at_finer_tolerances(known, resolved(known))
             checked.append(self._with_duration(after) if solution.success else after)
             if checked[-1].success:
                 return [_noting_cheaper(checked), *found[i + 1 :]]
@@ -224,10 +224,10 @@ class Search:
         return [best if self.fine.tolerance is None else unresolved_if_whirling(best)]
 
     def _at_finer_tolerances(self, solution: Solution, refused: Solution) -> Solution:
-        """A minimum that is not resolved at its tolerance, at the first finer one at which it is.
+        """A minimum that is unresolved at its tolerance, refined to finer ones until it is not.
 
-        A coarse tolerance may be met on a grid that two finer ones contradict. refused: the
-        solution with the reason. It is kept where no tolerance helps.
+        A coarse tolerance may be satisfied on a grid that two finer ones contradict.
+        refused: the solution as unresolved, which is returned if no tolerance helps.
         """
         given = self.fine.tolerance
         if given is None or self.free is not None or refused.status is not Status.UNRESOLVED:
