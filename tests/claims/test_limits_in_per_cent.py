@@ -65,6 +65,16 @@ def test_shares_are_of_the_base(scene: hovi.Scene, given: Any, expected: list[fl
     np.testing.assert_allclose(limits.upper[1], expected, rtol=1e-12)
 
 
+def test_shares_are_the_numbers_written_out_bit_by_bit(scene: hovi.Scene) -> None:
+    of_urdf = scene.robot.model.velocityLimit
+    for per_cent in range(1, 101):
+        written = [float(f"{per_cent / 100:.2f}") * x for x in of_urdf]
+        shares = hovi.as_limits(scene.robot, {"v": f"{per_cent} %"})
+        numbers = hovi.as_limits(scene.robot, {"v": written})
+        np.testing.assert_array_equal(shares.upper, numbers.upper)
+        np.testing.assert_array_equal(shares.lower, numbers.lower)
+
+
 def test_accelerations_are_of_the_maker_of_an_arm(scene: hovi.Scene) -> None:
     arm = hovi.load_robot("panda", locked=["panda_finger_joint1", "panda_finger_joint2"])
     published = hovi.as_limits(arm, "panda")

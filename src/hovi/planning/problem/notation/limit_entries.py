@@ -11,7 +11,7 @@ import numpy.typing as npt
 from hovi.checks.kinds import is_number, shown
 from hovi.checks.shapes import numbers_of
 from hovi.errors import InputError
-from hovi.planning.problem.units import SHARES, number_and_unit
+from hovi.planning.problem.units import number_and_unit
 from hovi.robot.space.coordinates import Coordinates
 
 
@@ -102,7 +102,7 @@ def _share(kind: str, name: str, text: str) -> float:
             f"limits.{kind} of {name!r} must be a positive number, a pair lower < upper, or a text "
             f"from above 0 % to 100 % of its limit, such as '50 %', got {shown(text)}."
         )
-    return number * SHARES[unit]
+    return number / 100  # as 0.57 is written: 57 * 1e-2 is another number
 
 
 def _pair(kind: str, name: str, value: Any) -> tuple[float, float]:
