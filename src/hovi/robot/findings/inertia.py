@@ -16,11 +16,12 @@ from hovi.robot.findings.subject import Subject
 Array = npt.NDArray[np.float64]
 
 DENSITY = 1_000.0
-"""Of a box around a shape, in [kg/m^3], of which an example of an inertia is made."""
-SHARE = 0.01
-"""Of the inertia of what moves with a link, from which an impossible inertia of it matters."""
-SMALL = 0.05
-"""The side at least of such a box of a link without shapes, in [m]."""
+"""Density of the boxes of which an example of an inertia is made, in [kg/m^3]."""
+LEAST_SIDE = 0.05
+"""Least side of the cube that stands for a link without shapes, in [m]."""
+MATTERS = 0.01
+"""By this fraction of its body's largest inertia an inertia violates the triangle inequality where
+it is a finding."""
 MANY = 4
 """Number of light joints beyond which all joints get the same rotor."""
 _AT = {"ixx": (0, 0), "ixy": (0, 1), "ixz": (0, 2), "iyy": (1, 1), "iyz": (1, 2), "izz": (2, 2)}
@@ -54,7 +55,7 @@ def bare_links(subject: Subject) -> Iterator[Finding]:
 
 
 def massless_links(subject: Subject) -> Iterator[Finding]:
-    """Those fixed to nothing that has a mass, where links behind give the joint its inertia."""
+    """Bare links of bodies without mass, whose joints have the inertia of links further out."""
     bare = set(_bare(subject))
     found = {
         link: joint
@@ -101,9 +102,9 @@ def impossible(subject: Subject) -> Iterator[Finding]:
 
 
 def harmful(subject: Subject) -> Iterator[Finding]:
-    """Those that are not outweighed by the rest of what moves with the link."""
+    """Inertias of no body that the rest of the link's body does not outweigh."""
     odd = _impossible(subject)
-    found = [name for name, much in odd.items() if much > SHARE * _largest_around(subject, name)]
+    found = [name for name, much in odd.items() if much > MATTERS * _largest_around(subject, name)]
     if found:
         lines = tuple(_possible(name, tensor_of(subject.links[name])) for name in found)
         yield _violating(Severity.MISLEADS, found, lines)
@@ -187,12 +188,11 @@ def _inertial(subject: Subject, link: str, joint: int) -> Line:
     """
     boxes = [x for x in subject.boxes if x.link == link and len(x.corners)]
     kind = "collision" if any(x.kind == "collision" for x in boxes) else "visual"
-    side = max(subject.sizes[joint] / 2, SMALL)
+    side = max(subject.sizes[joint] / 2, LEAST_SIDE)
     mass, center, tensor = _solid([x for x in boxes if x.kind == kind], float(side))
-    stated = subject.links[link].find("inertial/mass")
-    if stated is not None and float(stated.get("value", "0")) > 0.0:
-        tensor *= float(stated.get("value", "0")) / mass
-        mass = float(stated.get("value", "0"))
+    stated = float(subject.inertial(link, "mass", "value"))
+    if stated > 0.0:
+        mass, tensor = stated, tensor * (stated / mass)
     at = " ".join(f"{x:.4g}" for x in center)
     parts = element("origin", {"xyz": at}), element("mass", {"value": f"{mass:.4g}"})
     text = element("inertial", {}, *parts, inertia_text(tensor))

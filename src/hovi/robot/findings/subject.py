@@ -15,7 +15,7 @@ from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 LEAST_SIZE = 0.05
-"""Size of a body at least, in [m], whatever its joints say."""
+"""Least size of a body, in [m]."""
 
 
 @dataclass(frozen=True)
@@ -31,11 +31,11 @@ class Subject:
     """What is known of a robot.
 
     urdf: its checked element <robot>, None without one. harmless: notes on what was taken out of
-    it. locked: joints that are fixed.
-    mimic: whether it was asked for, leaders: those of the joints that mimic others then, by name.
+        it. locked: joints that are fixed.
+    mimic: whether joints follow their leaders. leaders: by the names of the joints that do.
     notes: of the reader of another format.
     light: joints with little inertia, by name. massless: indices of joints that have none.
-    ambiguous: what names stand for that several frames have.
+    ambiguous: the kind of frame that a name stands for, by names that several frames have.
     boxes: of its shapes, none where they are not looked at. tips: its tip frames.
     """
 
@@ -91,37 +91,40 @@ class Subject:
 
     @cached_property
     def sizes(self) -> Array:
-        """How large the bodies of joints are, in [m]: from the joint to the center of mass, or to
-        the next joints."""
+        """Sizes of the bodies of joints, in [m]: distances to the center of mass or next joints."""
         sizes = np.array([max(LEAST_SIZE, np.linalg.norm(x.lever)) for x in self.model.inertias])
-        pairs = zip(self.model.parents, self.model.jointPlacements, strict=True)
-        for parent, placement in list(pairs)[1:]:
-            sizes[parent] = max(sizes[parent], np.linalg.norm(placement.translation))
+        for parent, distance in self._steps:
+            sizes[parent] = max(sizes[parent], distance)
         return sizes
 
     @cached_property
     def reach(self) -> float:
         """The length of its longest chain of joints, in [m]."""
         reach = [0.0]
-        for parent, placement in list(
-            zip(self.model.parents, self.model.jointPlacements, strict=True)
-        )[1:]:
-            reach.append(reach[parent] + float(np.linalg.norm(placement.translation)))
+        for parent, distance in self._steps:
+            reach.append(reach[parent] + distance)
         return max(reach)
+
+    @property
+    def _steps(self) -> list[tuple[int, float]]:
+        """The parent of each joint but the world's, and the distance between them, in [m]."""
+        pairs = zip(self.model.parents, self.model.jointPlacements, strict=True)
+        return [(int(i), float(np.linalg.norm(x.translation))) for i, x in pairs][1:]
+
+    def inertial(self, link: str, tag: str, key: str) -> str:
+        """An attribute of an element in the <inertial> of a link; "0" without one."""
+        found = self.links[link].find(f"inertial/{tag}")
+        return "0" if found is None else found.get(key, "0")
 
     def moving_links(self) -> Iterator[Element]:
         """Links moved by a joint of their own, and others that move and have shapes.
 
         A link without shapes on a fixed joint is a frame.
         """
-        own = {_end(joint, "child") for joint in self.elements.values()}
+        children = (joint.find("child") for joint in self.elements.values())
+        own = {child.get("link", "") for child in children if child is not None}
         moved = {name for joint, names in self.bodies.items() if joint for name in names}
         for name, link in self.links.items():
             has_shapes = not {"visual", "collision"}.isdisjoint(part.tag for part in link)
             if name in own or (name in moved and has_shapes):
                 yield link
-
-
-def _end(joint: Element, tag: str) -> str:
-    element = joint.find(tag)
-    return "" if element is None else element.get("link", "")

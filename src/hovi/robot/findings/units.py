@@ -37,7 +37,7 @@ def grams(subject: Subject) -> Iterator[Finding]:
         return
 
     def line(link: str) -> Iterator[Line]:
-        mass = float(_attribute(subject, link, "mass", "value"))
+        mass = float(subject.inertial(link, "mass", "value"))
         if mass >= HEAVY / 10:
             yield Line(f"{_link(link)}/inertial", _mass(mass / 1e3))
 
@@ -63,7 +63,7 @@ def square_millimetres(subject: Subject) -> Iterator[Finding]:
     factor = min((1e-6, 1e-9), key=lambda x: abs(np.log(wide[body] * np.sqrt(x) / USUAL)))
 
     def line(link: str) -> Iterator[Line]:
-        tensor, mass = tensor_of(subject.links[link]), _attribute(subject, link, "mass", "value")
+        tensor, mass = tensor_of(subject.links[link]), subject.inertial(link, "mass", "value")
         size = WIDE / 10 * subject.sizes[model.frames[model.getFrameId(link)].parentJoint]
         if tensor is not None and np.trace(tensor) > float(mass) * size**2:
             yield Line(f"{_link(link)}/inertial", inertia_text(factor * tensor))
@@ -98,11 +98,6 @@ def _mass(value: float) -> str:
 
 def _link(name: str) -> str:
     return f"link[@name={quoted(name)}]"
-
-
-def _attribute(subject: Subject, link: str, tag: str, key: str) -> str:
-    found = subject.links[link].find(f"inertial/{tag}")
-    return "0" if found is None else found.get(key, "0")
 
 
 def _gyration(inertia: pin.Inertia) -> float:
