@@ -353,6 +353,8 @@ def _motions() -> list[Call]:
         own(hovi.State([0.0, 1.0]), "on", robot(), "start"),
         own(hovi.State([0.0, 1.0]), "free_on", robot(), "start"),
         own(hovi.State([0.0, 1.0]), "turns_on", robot(), "start"),
+        own(hovi.State([0.0, 1.0]), "angles_on", robot()),
+        own(hovi.State([0.0, 1.0]), "turns_made", robot(), np.array([0.0, 1.0])),
         build(
             hovi.Trajectory,
             **{"grid": trajectory.grid, "path": path, "momenta": trajectory.momenta},

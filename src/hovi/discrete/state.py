@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.checks.arguments import check_arguments_except
+from hovi.checks.shapes import require_shape
 from hovi.errors import InputError, nearest, warn
 from hovi.robot.robot import Robot
 from hovi.robot.space.angle_ranges import angles_in_degrees
@@ -101,13 +102,14 @@ class State:
         """The angles that q gives of continuous joints, NaN elsewhere, shape (nv,), in [rad]."""
         return angles_in(self.q, coordinates)
 
-    def turns_made(self, coordinates: Coordinates, q: Array) -> dict[str, int]:
+    def turns_made(self, coordinates: Coordinates, reached: Array) -> dict[str, int]:
         """Full turns of the continuous joints, of those that have made any.
 
-        q: configuration (nq,) of the state, which is another one where joints are free.
+        reached: configuration (nq,) of the state, which is another one where joints are free.
         """
-        rest = remainder(q, coordinates.space)
-        angles = nearest_angles(q, known_or(self.angles_on(coordinates), rest), coordinates.space)
+        require_shape("reached", reached, coordinates.nq)
+        rest, space = remainder(reached, coordinates.space), coordinates.space
+        angles = nearest_angles(reached, known_or(self.angles_on(coordinates), rest), space)
         turns = np.round((angles - rest) / (2 * np.pi))
         return {coordinates.coordinate_names[i]: int(turns[i]) for i in np.flatnonzero(turns)}
 
