@@ -32,7 +32,7 @@ KINDS = {
     "urdf": ("hard.mutated_urdf", 10_000),
     "scene": ("hard.mutated_scene", 6_000),
     "trajectory": ("hard.mutated_motion", 6_000),
-    "kept": ("hard.mutated_motion_meshes", 3_000),
+    "motion_meshes": ("hard.mutated_motion_meshes", 3_000),
     "segments": ("hard.mutated_segments", 6_000),
     "obstacles": ("hard.mutated_obstacles", 10_000),
     "study": ("hard.mutated_study", 6_000),

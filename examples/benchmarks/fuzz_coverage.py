@@ -22,7 +22,7 @@ MODULES = {
     "urdf": "hard.mutated_urdf",
     "scene": "hard.mutated_scene",
     "trajectory": "hard.mutated_motion",
-    "kept": "hard.mutated_motion_meshes",
+    "motion_meshes": "hard.mutated_motion_meshes",
     "segments": "hard.mutated_segments",
     "study": "hard.mutated_study",
     "command": "hard.mutated_command",

@@ -2,10 +2,10 @@
 
 The file is a plain npz that `numpy.load(path, allow_pickle=False)` reads. It is written without
 compression and with fixed time stamps, so that the same motion gives the same bytes on every
-machine. A mesh is an entry of the bytes that `zlib.decompress` unpacks, under "mesh-" and the
-SHA-256 of its content; the header has the names in the URDF for it. Files are untrusted input:
-sizes are checked before memory is allocated, and pickles are never decoded. The header holds the
-SHA-256 of the file's contents, which shows changes by accident or by hand; it is no signature.
+machine. A mesh is an entry "mesh-" with the SHA-256 of its content, of bytes that `zlib.decompress`
+unpacks; the header maps its names in the URDF to that hash. Files are untrusted input: sizes are
+checked before memory is allocated, and pickles are never decoded. The header holds the SHA-256 of
+the file's contents, which shows changes by accident or by hand; it is no signature.
 """
 
 from __future__ import annotations

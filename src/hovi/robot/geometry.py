@@ -3,7 +3,7 @@
 Mesh names are untrusted input: each file must lie inside its own package folder (or, for plain
 paths, inside the URDF's folder, the ROS package around it, or one of `package_dirs`), and so must
 every file that a mesh names. A shape whose mesh is missing or lies outside is left out and the
-reason is recorded; the robot stays usable. Meshes that came with a motion are taken from there.
+reason is recorded; the robot stays usable. Meshes that a motion's file stores are taken from there.
 """
 
 from __future__ import annotations
@@ -111,7 +111,7 @@ def find_mesh(filename: str, source: RobotSource, drawn: bool = False) -> tuple[
 
 
 def _find_file(filename: str, source: RobotSource, drawn: bool) -> tuple[Path, bytes]:
-    """The same for a mesh that did not come with a motion."""
+    """The same for a mesh that is not stored in a motion's file."""
     try:
         candidates = list(_candidates(filename, source))
         for root, path in candidates:

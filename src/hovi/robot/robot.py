@@ -381,8 +381,8 @@ class Robot(Coordinates):
     ) -> Robot:
         """The robot from the result of `to_dict`, built from the text of its URDF.
 
-        package_dirs: local folders that contain the packages of its meshes. meshes: those that
-            came with a motion, by the sha256 of the URDF; they are taken first.
+        package_dirs: local folders that contain the packages of its meshes. meshes: those stored
+            in a motion's file, by the sha256 of the URDF; they are taken first.
         Raises ModelError, also for a robot that was loaded from a pinocchio.Model.
         """
         if not isinstance(data, Mapping) or not isinstance(data.get("name"), str):

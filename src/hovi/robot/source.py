@@ -39,7 +39,7 @@ class RobotSource:
     srdf: the text of the SRDF, or None.
     mimic: whether joints with a <mimic> tag follow their leaders.
     notes: what the file of a model says and the model does not have, for `hovi info`.
-    meshes: those that the file of a motion brought, which are taken before any of a folder.
+    meshes: those stored in a motion's file, which are taken before any of a folder.
     Raises ModelError for such a folder.
     """
 

@@ -105,7 +105,7 @@ def drawn(
 
 
 class _RobotVisualizer(MeshcatVisualizer):  # type: ignore[misc]
-    """Pinocchio's, which also draws the meshes that came with a motion; no file of these exists."""
+    """Pinocchio's, which also draws meshes stored in a motion's file, without writing them."""
 
     def __init__(self, robot: Robot, visual: pin.GeometryModel) -> None:
         super().__init__(robot.model, None, visual)

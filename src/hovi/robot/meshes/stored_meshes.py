@@ -1,4 +1,4 @@
-"""The mesh files of robots in a motion's file: by the names in the URDF, each content once.
+"""Meshes of robots stored in a motion's file: by their names in the URDF, each content once.
 
 Names are only looked up, never opened, so that no name in a file leads to a folder of the reader.
 """
@@ -40,7 +40,7 @@ class StoredMesh:
 
     @property
     def hashes(self) -> tuple[str, ...]:
-        """Those of all of its files."""
+        """The sha256 of its file and of its textures."""
         return (self.sha256, *self.textures.values())
 
 
@@ -65,7 +65,7 @@ class StoredMeshes:
 
     @cached_property
     def paths(self) -> dict[str, str]:
-        """What stands for the path of each mesh that is there: its hash in place of the folder."""
+        """Stand-in paths of the meshes that are there, by name: a hash in place of the folder."""
         kept = (name for name in self.meshes if self.keeps(name))
         return {
             name: f"{self.meshes[name].sha256}-{number}/{PurePosixPath(name).name}"
@@ -73,7 +73,7 @@ class StoredMeshes:
         }
 
     def name_at(self, path: str) -> str | None:
-        """The name of the mesh for whose path another one stands; None without one."""
+        """The name of a mesh by its stand-in path; None for another path."""
         return next((name for name, each in self.paths.items() if each == path), None)
 
 
@@ -102,12 +102,11 @@ class Packing:
             self._left = kept - len(packed), contents - len(content), files - 1
         return sha256
 
-    def keep(self) -> bool:
-        """Keep all that was added since the last call, or nothing; returns whether it is kept."""
+    def keep(self) -> None:
+        """Keep all that was added since the last call, or nothing if it is too much."""
         fits, added, self._added = not self.is_full, self._added, {}
         self.packed |= added if fits else {}
         self._room = self._left = self._left if fits else self._room
-        return fits
 
 
 def content_hash(content: bytes) -> str:

@@ -48,9 +48,9 @@ def check_mesh(path: Path, root: Path, drawn: bool) -> bytes:
 
 
 def check_stored(path: Path, content: bytes, textures: Collection[str], drawn: bool) -> None:
-    """The same check of a mesh that the file of a motion brought.
+    """The same check of a mesh that is stored in a motion's file. Raises ModelError.
 
-    path: what stands for its path. textures: the names of those that came with it.
+    path: its stand-in path. textures: the names of those that are stored with it.
     """
     _type_of(path)
     missing = [name for name in shown_textures(path, content) if name not in textures]
