@@ -47,7 +47,7 @@ class Effect(ABC):
     storable: ClassVar[bool] = True
     """Whether its fields are data that files contain."""
 
-    @check_arguments
+    @check_arguments  # keeps the tracebacks of its errors short
     def __post_init__(self) -> None:
         """Convert lists to tuples, so that effects read from a file equal those written.
 

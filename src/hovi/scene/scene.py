@@ -327,15 +327,14 @@ def require_known_joints(robot: Robot) -> None:
 @lru_cache(maxsize=64)
 def without_inertia(scene: Scene) -> str:
     """The joints without inertia, in words; "" if the mass matrix is regular."""
-    joints = joints_without_inertia(scene.model)
-    return named_joints(scene.model, joints)
+    return named_joints(scene.model, joints_without_inertia(scene.model))
 
 
 @lru_cache(maxsize=64)
 def require_plannable(scene: Scene, torques: bool = True) -> None:
-    """Raise ModelError for a robot without moving joints or with an invalid mass matrix.
+    """Raise ModelError for a robot without moving joints, or without inertia at one of them.
 
-    torques: whether they are asked for; without them, no mass matrix is needed.
+    torques: whether they are needed; without them, no inertia is.
     """
     robot = scene.robot
     require_known_joints(robot)
@@ -343,7 +342,7 @@ def require_plannable(scene: Scene, torques: bool = True) -> None:
         raise ModelError(
             f"robot {robot.name!r} has no joint that moves; load it with fewer joints locked."
         )
-    if torques and without_inertia(scene):
+    if torques and without_inertia(scene):  # which is cached
         check_mass_matrix(scene.model)
 
 

@@ -234,7 +234,7 @@ def _notes(found: Solution, scenes: Sequence[Scene], options: PlanOptions) -> It
 def run(search: Search, began: float) -> Solution:
     """The best solution of a search, with its times. began: of the plan, by the clock."""
     for job in filter(None, (search.fine, search.without)):
-        job.problem()  # however little time is left
+        job.problem()  # outside of the deadline: every solution has its problem
     started = time.perf_counter()
     with search.deadline.in_force():
         best, minima = search.run()

@@ -10,8 +10,8 @@ from hovi.errors import InputError, nearest
 from hovi.scene.scene import Scene, without_inertia
 
 Objective = Literal["effort", "acceleration", "jerk", "time"]
-"""Names of what is minimised."""
 OBJECTIVES: tuple[str, ...] = get_args(Objective)
+"""Names of what is minimised."""
 IN_WORDS = '"effort", "acceleration", "jerk" or "time"'
 
 
@@ -38,7 +38,7 @@ def with_objective(scene: Scene, objective: str, weighted: bool = False) -> Scen
         objective = "acceleration" if without_inertia(scene) else "effort"
     if objective == "effort":
         return scene
-    from hovi.effects.effort_weight import EffortWeight  # most plans are about effort
+    from hovi.effects.effort_weight import EffortWeight  # here: most plans minimise effort
     from hovi.effects.motion_cost import AccelerationCost, JerkCost
 
     cost = AccelerationCost(1.0) if objective == "acceleration" else JerkCost(1.0)

@@ -33,8 +33,8 @@ def smoothed(scene: Scene, start: State, goal: State | FrameGoal, duration: floa
     """The scene with a cost on the jerk, w = (SMOOTHING_SHARE T M)^2.
 
     M is the largest eigenvalue of the mass matrix at the ends, of its block of angles for joints
-    that turn, and of its block of lengths for joints that slide. Where torques cost nothing, but
-    accelerations do, M^2 is the largest of their weights.
+    that turn, and of its block of lengths for joints that slide. Where torques are free and
+    accelerations have weights, M^2 is the largest of these.
     duration: T, in [s]. Raises InputError for a scene that has a cost on the jerk already,
     ModelError for torques of a robot without inertia.
     """
@@ -43,11 +43,11 @@ def smoothed(scene: Scene, start: State, goal: State | FrameGoal, duration: floa
             "smooth = true chooses the weight of a cost on the jerk, and the scene has one, "
             'jerk_cost, or by objective = "jerk": leave one of the two out.'
         )
-    curvature = _of_acceleration(scene)
-    if curvature is None:
-        curvature = _of_torques(scene, start, goal)
+    squared = _acceleration_weights(scene)
+    if squared is None:
+        squared = _squared_inertias(scene, start, goal)
     with np.errstate(over="ignore", under="ignore"):
-        weight = (SMOOTHING_SHARE * duration * np.sqrt(curvature)) ** 2
+        weight = (SMOOTHING_SHARE * duration * np.sqrt(squared)) ** 2
     if not (np.isfinite(weight).all() and (weight > 0).all()):
         raise InputError(
             "smooth = true weights the jerk by the square of the duration, which is too short or "
@@ -56,8 +56,8 @@ def smoothed(scene: Scene, start: State, goal: State | FrameGoal, duration: floa
     return dataclasses.replace(scene, effects=[*scene.effects, JerkCost(tuple(weight.tolist()))])
 
 
-def _of_acceleration(scene: Scene) -> Array | None:
-    """The largest weight of an acceleration where torques cost nothing, (nv,); else None."""
+def _acceleration_weights(scene: Scene) -> Array | None:
+    """M^2 as the largest weight of an acceleration, (nv,); None unless torques are free."""
     own = next((each for each in scene.effects if isinstance(each, AccelerationCost)), None)
     if own is None or scene.effort_lagrangian(regular=False).needs_torques:
         return None
@@ -65,8 +65,8 @@ def _of_acceleration(scene: Scene) -> Array | None:
     return _largest_of_each_kind(scene.robot, lambda kind: float(weights[kind].max()))
 
 
-def _of_torques(scene: Scene, start: State, goal: State | FrameGoal) -> Array:
-    """M^2 with the largest eigenvalue of the mass matrix at the ends, (nv,)."""
+def _squared_inertias(scene: Scene, start: State, goal: State | FrameGoal) -> Array:
+    """M^2 as the largest squared eigenvalue of the mass matrix at the ends, (nv,)."""
     require_plannable(scene)  # raises where a joint has no inertia
     robot = scene.robot
     known = [(start, "start"), *([(goal, "goal")] if isinstance(goal, State) else [])]

@@ -13,12 +13,12 @@ from hovi.planning.solver.solver import Solution, solution_of
 from hovi.planning.solver.status import Status, infeasible_sentence
 
 WIDER = "make what changes wider than that, or leave it out"
-"""What to do about formulas that change too fast."""
+"""Advice about formulas of time that change too fast."""
 SHORTER = (
     "plan a motion of seconds and rest before or after it, or add the effect viscous_friction or a "
     "cost on the motion"
 )
-"""What to do about motions that take too long."""
+"""Advice about motions that would swing too often."""
 
 
 def minimum_at(
