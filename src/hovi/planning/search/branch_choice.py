@@ -53,6 +53,8 @@ TURNED = 4
 ROUGH, FROM_ROUGH = 3, 6
 """Number of rough motions between each pair, from random bumps, and of pairs for which a motion is
 solved for from the best of them, besides that from the cubic."""
+CLEARED = 4
+"""Largest number of them that are solved for again with links kept apart."""
 INTERVALS = 4
 """Number of intervals of these motions."""
 LAST_BARRIER = 1e-2
@@ -101,10 +103,8 @@ class Ends:
             return None
         choice = dataclasses.replace(self.choice, deadline=deadline.part(SHARE))
         known = [each for each in self._from_start if each.known]
-        best = choice.clear(known, cost)
-        if best is None or (best.pair is known[0].pair and best.found.cost >= cost):
-            return None
-        return choice.chosen((best,))
+        best = choice.clear(known, cost) if known else None
+        return None if best is None else choice.chosen((best,))
 
 
 def chosen_ends(
@@ -199,21 +199,25 @@ class _Choice:
         return Ends(best.start, self._goal_at(best.q), motions, self)
 
     def clear(self, motions: Sequence[_Motion], cost: float) -> _Motion | None:
-        """The cheapest of motions once they are clear; None if none costs less than `cost`.
+        """The cheapest of motions when they keep clear, if it is cheaper than the first of them.
 
-        motions: the cheapest first. Clear ones cost no less, so that the search ends at the first
-        that is dearer than the best. cost: of a clear motion like the first, unless it is found
-        again here.
+        motions: the cheapest first. They cost no less for keeping clear, so that dearer ones than
+        the best are not solved for. cost: of the first of them on many intervals; the others are
+        compared with what it costs on a few.
         """
-        best = None
+        first, best = motions[0], None
         try:
             with self.deadline.in_force():
-                for number, motion in enumerate(motions):
-                    if number > 0 and motion.found.cost >= cost:
+                for motion in motions[:CLEARED]:
+                    if motion is not first and motion.found.cost >= cost:
                         break
                     clear = self._clear(motion)
-                    if clear.found.success and (number == 0 or clear.found.cost < cost):
+                    if not clear.found.success:
+                        continue
+                    if clear.found.cost < cost:
                         best, cost = clear, clear.found.cost
+                    elif motion is first:
+                        cost = clear.found.cost
         except (OutOfTimeError, HoviError):
             pass
         return best
