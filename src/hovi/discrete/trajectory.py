@@ -244,7 +244,8 @@ class Trajectory(Positions, ExportMethods, TrajectorySummary):
         """(q, v, ..., q^(order)), each (M, n): rows(s) @ (h v0, Z, c) in the interval's chart."""
         if self._curve is not None and 0 <= order <= 2:
             return self._curve.in_intervals(k, s)[2 : order + 3]  # type: ignore[return-value]
-        most = max(2 if self.space is not None else 3, self.grid.order)
+        commutes = self.space is None or self.space.flat
+        most = max(3 if commutes else 2, self.grid.order)
         if not 0 <= order <= most:
             raise InputError(f"this motion has derivatives up to {most}, not {order}.")
         top = max(2, self.grid.order, order)
