@@ -21,7 +21,7 @@ from hovi.robot.space.unwrapped_angles import unwrapped
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]
 
-MOST_TURNS = 1e9
+MAX_TURNS_AT_START = 1e9
 """Largest number of full turns at a start."""
 
 
@@ -80,7 +80,7 @@ class Positions:
         """Angles of continuous joints at the nodes, full turns included, (N + 1, nv), in [rad]."""
         first = remainder(self.path.q[0], space) + 2 * np.pi * self.turns_at_start
         changes = np.cumsum(changes_along(self.path, self.grid.steps), axis=0)
-        return np.asarray(first + np.concatenate([0.0 * first[None], changes]))
+        return np.asarray(first + np.concatenate([np.zeros((1, len(first))), changes]))
 
     @property
     def turns_at_start(self) -> Array:
@@ -89,7 +89,7 @@ class Positions:
         angles = () if space is None else space.angles
         known, found = {names[each.v.start]: each.v for each in angles}, np.zeros(len(names))
         for joint, count in self.turns.items():
-            if joint not in known or type(count) is not int or not abs(count) <= MOST_TURNS:
+            if joint not in known or type(count) is not int or not abs(count) <= MAX_TURNS_AT_START:
                 raise InputError(
                     "the full turns at the start are whole numbers of continuous joints, not "
                     f"{shown(count)} of {joint!r}."

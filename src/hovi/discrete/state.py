@@ -25,7 +25,7 @@ Mask = npt.NDArray[np.bool_]
 MAX_TURNS = 1_000_000
 """Largest number of full turns of an initial guess."""
 _FREE = "free", "free_velocity", "free_acceleration", "free_jerk"
-Positions = npt.ArrayLike | str | Mapping[str, Any]
+Configuration = npt.ArrayLike | str | Mapping[str, Any]
 """A configuration (nq,), the name of a pose, or a table of joints."""
 Rates = npt.ArrayLike | Mapping[str, Any]
 """A velocity, acceleration or jerk (nv,), or a table of joints."""
@@ -57,7 +57,7 @@ class State:
     Raises InputError for turns that are not given by joint.
     """
 
-    q: Positions
+    q: Configuration
     v: Rates | None = None
     _: KW_ONLY
     free: Sequence[str] = ()
@@ -299,7 +299,7 @@ def _chosen_coordinates(
     return chosen
 
 
-def as_state(state: State | Positions, coordinates: Coordinates, name: str = "state") -> State:
+def as_state(state: State | Configuration, coordinates: Coordinates, name: str = "state") -> State:
     """A State: of a configuration at rest, the name of a pose, or a table of joints.
 
     name: of the state in messages, such as "start".

@@ -30,9 +30,9 @@ from hovi.planning.problem.goals import Via, goal_state
 from hovi.planning.problem.hessian_structure import ActionStructure
 from hovi.planning.problem.limits import Limits, no_limits
 from hovi.planning.problem.node_conditions import NodeCondition
+from hovi.planning.problem.notation.goal_turns import turns_to
 from hovi.planning.problem.notation.summaries import ProblemSummary
 from hovi.planning.problem.notation.supported import require_dynamics, require_supported
-from hovi.planning.problem.notation.whole_turns import turns_to
 from hovi.planning.problem.seams import Hold, ViaPoints, curve_through, holding
 from hovi.planning.problem.torque_moments import TorqueMoments
 from hovi.planning.problem.way_back.end_state import EndState

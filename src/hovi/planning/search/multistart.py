@@ -23,7 +23,7 @@ from hovi.discrete.state import State
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import ChartError
 from hovi.planning.paths.first_guesses import FirstGuesses
-from hovi.planning.problem.notation.whole_turns import says_turns
+from hovi.planning.problem.notation.goal_turns import says_turns
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.search.free_duration import FreeDuration
 from hovi.planning.search.job import Job

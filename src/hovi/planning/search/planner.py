@@ -20,8 +20,8 @@ from hovi.planning.clearance.self_collisions import not_looked_at, pairs_left_ou
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.goals import Via
 from hovi.planning.problem.notation.ends import End, as_end
+from hovi.planning.problem.notation.goal_turns import says_turns, turns_sentence
 from hovi.planning.problem.notation.smoothing import smoothed
-from hovi.planning.problem.notation.whole_turns import says_turns, turns_sentence
 from hovi.planning.problem.presolve.assumptions import assumptions
 from hovi.planning.problem.presolve.findings import findings
 from hovi.planning.problem.presolve.length_slips import grasped_slips

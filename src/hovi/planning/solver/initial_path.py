@@ -11,7 +11,7 @@ from hovi.discrete.node_continuity import require_continuous
 from hovi.discrete.state import State
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError
-from hovi.planning.problem.notation.whole_turns import says_turns, turns_after
+from hovi.planning.problem.notation.goal_turns import says_turns, turns_after
 from hovi.planning.problem.problem import TrajectoryProblem
 
 Array = npt.NDArray[np.float64]

@@ -50,17 +50,17 @@ Configuration = Annotated[
     Numbers | ByJoint | Annotated[str, Tag("<text>")], Discriminator(_kind_or_text)
 ]
 
-Pair = Annotated[
+PositionBound = Annotated[
     Annotated[float, Tag("<number>")] | Annotated[list[float], Tag("<list>")],
     Discriminator(_kind),
 ]
-Positions = Annotated[
+PositionBounds = Annotated[
     Annotated[float, Tag("<number>")]
-    | Annotated[list[Pair], Tag("<list>")]
-    | Annotated[dict[str, Pair], Tag("<table>")],
+    | Annotated[list[PositionBound], Tag("<list>")]
+    | Annotated[dict[str, PositionBound], Tag("<table>")],
     Discriminator(_kind),
 ]
-_POSITIONS = (
+_POSITION_BOUNDS = (
     "a positive number, a list with a positive number or a pair [lower, upper] for each joint, "
     "or a table of joint names"
 )
@@ -230,7 +230,7 @@ class LimitsTable(Table):
     base: LimitsName = Field(
         default="urdf", description='"urdf", "soft", "none" or the name of an arm, such as "panda"'
     )
-    q: Positions | None = Field(default=None, description=_POSITIONS)
+    q: PositionBounds | None = Field(default=None, description=_POSITION_BOUNDS)
     v: Bounds | None = Field(default=None, description=_BOUNDS)
     a: Bounds | None = Field(default=None, description=_BOUNDS)
     tau: Bounds | None = Field(default=None, description=_BOUNDS)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable
 from typing import Any
 
 from hovi.discrete.trajectory import Trajectory
@@ -27,6 +26,10 @@ def motions_in(given: Any) -> list[Trajectory]:
     """The trajectories of a list of motions, or of a single one. Raises InputError."""
     if isinstance(given, str | os.PathLike | Trajectory) or hasattr(given, "trajectory"):
         given = (given,)
-    if not isinstance(given, Iterable) or getattr(given, "shape", None) == ():
-        raise InputError(f"compare must be a list of motions, got {type(given).__name__}.")
-    return [motion_in(each) for each in given]
+    try:
+        motions = list(given)
+    except TypeError:
+        raise InputError(
+            f"compare must be a list of motions, got {type(given).__name__}."
+        ) from None
+    return [motion_in(each) for each in motions]

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import dataclasses
 from functools import lru_cache
-from typing import Any, Literal, get_args
+from typing import Any
 
 from hovi.errors import InputError, nearest
 from hovi.scene.scene import Scene, without_inertia
 
-Objective = Literal["effort", "acceleration", "jerk", "time"]
-OBJECTIVES: tuple[str, ...] = get_args(Objective)
+OBJECTIVES = "effort", "acceleration", "jerk", "time"
 """Names of what is minimised."""
 IN_WORDS = '"effort", "acceleration", "jerk" or "time"'
 

@@ -13,7 +13,7 @@ from hovi.planning.clearance.clearance_violation import (
 )
 from hovi.planning.problem.limit_violation import excess_of, worst_sentence
 from hovi.planning.problem.limits import Limits
-from hovi.planning.problem.notation.whole_turns import turns_missed
+from hovi.planning.problem.notation.goal_turns import turns_missed
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.augmented_lagrangian_rounds import (
