@@ -157,8 +157,8 @@ def _planned(
     chosen, apart = kept_apart(options.on(scene), scene.robot, ends_of(*given, options.via))
     deadline = Deadline(chosen.time_limit_seconds)
     free, T = _time(scene, duration, chosen)
-    search = _Planning(scene, *given, T, chosen, free)
-    job = search.job(nearest_ends(scene, *given, chosen), deadline)
+    planning = _Planning(scene, *given, T, chosen, free)
+    job = planning.job(nearest_ends(scene, *given, chosen), deadline)
     for bound in () if free is None else (free.lower, free.upper):
         job.grid.stretched(bound)  # raises for steps that are too short or too long
     problem = job.problem()  # raises for invalid input before the search
@@ -172,17 +172,8 @@ def _planned(
     if nothing is not None:
         seconds = time.perf_counter() - began
         return with_notes(nothing, [job.scene], job.options, apart, seconds)
-    ends = Ends(job.start, job.goal)
-    if FrameGoal in map(type, given):
-        ends = chosen_ends(scene, *given, T, chosen, deadline)
-        known = job.scene if ends.start is job.start else None
-        job = search.job((ends.start, ends.goal), deadline, known)
-    without = None
-    if chosen.self_collision:
-        loose = dataclasses.replace(search, options=chosen.with_changes(self_collision=False))
-        without = loose.job((job.start, job.goal), deadline, job.scene)
-    solution = run(Search(job, deadline, progress or silent, free, without, ends), began)
-    return with_notes(solution, [job.scene], job.options, apart)
+    search = planning.search(job, deadline, progress or silent)
+    return with_notes(run(search, began), [search.fine.scene], search.fine.options, apart)
 
 
 def with_notes(
@@ -321,6 +312,23 @@ class _Planning:
             scene.effort_lagrangian(options.weight)  # its functions may have to be compiled
             job = Job(scene, grid, *ends, options)
         return split_for_charts(job.on(job.graded(grid)), options.guess)
+
+    def search(self, job: Job, deadline: Deadline, progress: Progress) -> Search:
+        """The search from a job between the nearest ends, or from the best branches of frames.
+
+        With self-collision it begins with the job without.
+        """
+        ends, options = Ends(job.start, job.goal), self.options
+        if FrameGoal in map(type, (self.start, self.goal)):
+            given = self.start, self.goal, self.duration
+            ends = chosen_ends(self.scene, *given, options, deadline)
+            known = job.scene if ends.start is job.start else None
+            job = self.job((ends.start, ends.goal), deadline, known)
+        without = None
+        if options.self_collision:
+            loose = dataclasses.replace(self, options=options.with_changes(self_collision=False))
+            without = loose.job((job.start, job.goal), deadline, job.scene)
+        return Search(job, deadline, progress, self.free, without, ends)
 
 
 def _time(
