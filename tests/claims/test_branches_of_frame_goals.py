@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+
 import numpy as np
 import pytest
 
@@ -111,3 +113,16 @@ def test_a_full_turn_within_limits_is_taken_where_it_is_cheaper() -> None:
     found = hovi.plan(scene, start, goal, 2.0, **KEEP)
     assert found.success
     np.testing.assert_allclose(found.trajectory.q[-1], there, atol=1e-6)
+
+
+def test_frames_at_both_ends_keep_to_a_time_limit(scene: hovi.Scene) -> None:
+    """All members of both families in pairs, with full turns, took 3 s of processor time."""
+    start, there = np.array([0.3, -1.2, 1.3, -0.7, 0.8, 0.0]), np.array([1.0, -1, 1, 0.0, 1, 0])
+    tool = [scene.robot.frame_pose("tool0", q)[:3, 3] for q in (start, there)]
+    ends = [hovi.FrameGoal("tool0", position=position) for position in tool]
+    hovi.plan(scene, start, there, DURATION, time_limit=0.2)  # which loads modules
+    began = time.process_time()
+    found = hovi.plan(scene, *ends, DURATION, time_limit=0.2)
+    assert time.process_time() - began <= 1.2 * 0.2 + 1.0
+    at_start = scene.robot.frame_pose("tool0", found.trajectory.q[0])[:3, 3]
+    np.testing.assert_allclose(at_start, tool[0], atol=1e-6)

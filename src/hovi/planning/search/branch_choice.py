@@ -24,6 +24,7 @@ from hovi.errors import HoviError, UnreachableError
 from hovi.planning.paths.rough_motions import rough_motions
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.inverse_kinematics import (
+    MOST,
     configurations,
     first_configuration,
     position_bounds,
@@ -121,7 +122,7 @@ def chosen_ends(
     duration: in [s]. options: resolved for the scene's robot. deadline: of the whole plan.
     Raises UnreachableError for a start that cannot be met; a goal then stays as it is.
     """
-    if isinstance(start, State) and (isinstance(goal, State) or goal.guess is not None):
+    if isinstance(start, State) and _is_one(goal):
         return Ends(start, goal)
     return _Choice(scene, start, goal, duration, options, deadline.part(SHARE)).ends()
 
@@ -184,7 +185,7 @@ class _Choice:
         """The ends of the cheapest motion; the nearest ones if no motion is found."""
         starts = self.starts()
         try:
-            pairs = [pair for start in starts for pair in self._pairs(start)]
+            pairs = self._all_pairs(starts)
         except UnreachableError:
             return Ends(starts[0], self.goal)
         known = self.scene.order in LIMITED_ORDERS and not self.scene.passive
@@ -241,8 +242,18 @@ class _Choice:
         """Configurations in which a frame meets its goal: that at the guess alone if it has one."""
         robot, options = self.scene.robot, self.options
         first = first_configuration(robot, goal, near if goal.guess is None else None, self._bounds)
-        found = configurations(robot, goal, first, self._bounds, options.clearance, SKETCHED)
+        most = SKETCHED if _is_one(self.start) or _is_one(self.goal) else MOST
+        found = configurations(robot, goal, first, self._bounds, options.clearance, most)
         return found if goal.guess is None else found[:1]
+
+    def _all_pairs(self, starts: Sequence[State]) -> list[_Pair]:
+        """The pairs of the nearest start, and of the others until the deadline."""
+        pairs = self._pairs(starts[0])
+        for start in starts[1:]:
+            if self.deadline.passed:
+                break
+            pairs += self._pairs(start)
+        return pairs
 
     def _pairs(self, start: State) -> list[_Pair]:
         """A start with all branches of the goal, each followed by what full turns make of it."""
@@ -271,7 +282,7 @@ class _Choice:
     def _goal_at(self, q: Array) -> State | FrameGoal:
         """The goal with a configuration as its guess, if it has none."""
         goal = self.goal
-        if isinstance(goal, State) or goal.guess is not None:
+        if isinstance(goal, State) or _is_one(goal):
             return goal
         return dataclasses.replace(goal, guess=q)
 
@@ -348,6 +359,11 @@ class _Choice:
         if isinstance(goal, FrameGoal):
             goal = State(pair.q, free_velocity=tuple(goal.free_velocity))
         return Job(self.scene, grid, pair.start, goal, options).problem()
+
+
+def _is_one(end: State | FrameGoal) -> bool:
+    """Whether an end is met in a single configuration, the given one."""
+    return isinstance(end, State) or end.guess is not None
 
 
 _WITHOUT_MOTION = Status.INFEASIBLE, Status.DIVERGED
