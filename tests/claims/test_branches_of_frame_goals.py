@@ -126,3 +126,20 @@ def test_frames_at_both_ends_keep_to_a_time_limit(scene: hovi.Scene) -> None:
     assert time.process_time() - began <= 1.2 * 0.2 + 1.0
     at_start = scene.robot.frame_pose("tool0", found.trajectory.q[0])[:3, 3]
     np.testing.assert_allclose(at_start, tool[0], atol=1e-6)
+
+
+def test_a_pose_that_no_clear_configuration_meets_is_refused_before_a_search(
+    scene: hovi.Scene,
+) -> None:
+    """The flange, which points away from a wall, is clear of it, and the wrist behind is not."""
+    start = [2.5, -1.2, 1.0, -0.6, -0.8, 0.2]
+    pose = np.eye(4)
+    pose[:3, :3] = [[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]]
+    pose[:3, 3] = [0.5, 0.0, 0.4]
+    wall = hovi.Box([0.2, 2.0, 2.0], [0.7, 0.0, 0.4])
+    goal = hovi.FrameGoal("tool0", pose)
+    assert hovi.plan(scene, start, goal, DURATION).success
+    found = hovi.plan(scene, start, goal, DURATION, obstacles=[wall])
+    assert found.status == "infeasible"
+    assert found.nit == 0
+    assert "but all of them come closer to obstacles or links than 0.01 m" in found.message

@@ -204,8 +204,8 @@ def _clear(q: Array, distances: Distances, margin: float) -> Array:
     raise UnreachableError(
         f"the goal is met by {len(q)} configurations that were found, but all of them come closer "
         f"to obstacles or links than {margin:g} m: in the best one {distances.pairs[pair]} "
-        f"{distance_in_words(distance)}; move the goal or the obstacle, reduce the margin, or ask "
-        "for more configurations.",
+        f"{distance_in_words(distance)}; move the goal or the obstacle, reduce the margin, or give "
+        "the goal a `guess` that is clear.",
         q[best],
     )
 

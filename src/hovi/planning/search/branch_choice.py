@@ -73,12 +73,14 @@ class Ends:
     start, goal: of the plan; a goal of a frame has the branch as its guess.
     motions: between pairs of branches, on a few intervals, the cheapest first; none where nothing
         was compared. choice: from which they come; None likewise.
+    reason: why there is no motion, as a clause; "" if there may be one.
     """
 
     start: State
     goal: State | FrameGoal
     motions: tuple[_Motion, ...] = ()
     choice: _Choice | None = None
+    reason: str = ""
 
     @property
     def compared(self) -> int:
@@ -186,8 +188,9 @@ class _Choice:
         starts = self.starts()
         try:
             pairs = self._all_pairs(starts)
-        except UnreachableError:
-            return Ends(starts[0], self.goal)
+        except UnreachableError as error:
+            near = str(error).rstrip(".") if self.options.clearance.wanted else ""
+            return Ends(starts[0], self.goal, reason=near)
         known = self.scene.order in LIMITED_ORDERS and not self.scene.passive
         solved = self._solved(pairs) if known and len(pairs) > 1 else ()
         if not solved:

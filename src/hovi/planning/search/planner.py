@@ -36,7 +36,7 @@ from hovi.planning.search.option_fields import spell_out
 from hovi.planning.search.options import PlanOptions
 from hovi.planning.search.search import Search
 from hovi.planning.solver.outcome.self_collision import self_collision_sentence
-from hovi.planning.solver.outcome.without_solve import without_search
+from hovi.planning.solver.outcome.without_solve import infeasible_at_once, without_search
 from hovi.planning.solver.solver import Solution
 from hovi.planning.solver.status import Status
 from hovi.robot.robot import Robot
@@ -163,17 +163,19 @@ def _planned(
         job.grid.stretched(bound)  # raises for steps that are too short or too long
     problem = job.problem()  # raises for invalid input before the search
     longest = problem if free is None else problem.on(problem.grid.stretched(free.upper))
-    found = findings(longest, *given)
-    warn_of_ends(scene.robot, job.start, job.goal, chosen, found.reason)
-    for sentence in found.warnings:
+    known = findings(longest, *given)
+    warn_of_ends(scene.robot, job.start, job.goal, chosen, known.reason)
+    for sentence in known.warnings:
         warn(sentence)
-    fault = "" if found.reason else job.fault_of_time
-    nothing = without_search(problem, longest, chosen.guess, found.reason, fault)
+    fault = "" if known.reason else job.fault_of_time
+    nothing = without_search(problem, longest, chosen.guess, known.reason, fault)
     if nothing is not None:
         seconds = time.perf_counter() - began
         return with_notes(nothing, [job.scene], job.options, apart, seconds)
     search = planning.search(job, deadline, progress or silent)
-    return with_notes(run(search, began), [search.fine.scene], search.fine.options, apart)
+    reason = "" if search.ends is None else search.ends.reason
+    found = infeasible_at_once(longest, chosen.guess, reason) if reason else run(search, began)
+    return with_notes(found, [search.fine.scene], search.fine.options, apart)
 
 
 def with_notes(
