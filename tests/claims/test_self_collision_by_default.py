@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import hovi
+from hovi.cli.application import main
 from oracles.mesh_distances import MeshDistances
 
 START = [0.0, -1.2, 1.0, -0.6, -0.8, 0.2]
@@ -163,3 +164,20 @@ def test_a_robot_without_shapes_plans_as_before(two_link: hovi.Robot) -> None:
     ]
     assert both[0].message == both[1].message
     np.testing.assert_array_equal(both[0].trajectory.q, both[1].trajectory.q)
+
+
+def test_missing_meshes_are_named_where_nothing_is_kept_apart(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    fork(tmp_path, 1.5)
+    path = tmp_path / "scene.toml"
+    path.write_text(
+        'format=2\nrobot = "fork.urdf"\nduration = 1\nstart = [0, 0, 0, 0]\ngoal = [0, 0, 0, 0]\n'
+    )
+    assert main(["info", str(path)]) == 0
+    assert "keeps 0.01 m from itself" in capsys.readouterr().out
+    (tmp_path / "fork.obj").unlink()
+    assert main(["info", str(path)]) == 0
+    out = capsys.readouterr().out
+    assert "from itself" not in out
+    assert "Self-collision was not looked at: distances need every collision shape" in out

@@ -537,7 +537,7 @@ def test_the_description_lists_properties_that_need_an_effect() -> None:
     for words in ("7 joints", "nv = 7", "arm_left_2_joint", "damping", "dry friction", "armature"):
         assert words in text
     assert "<mimic>" in load_robot("panda").describe()
-    assert "takes (cos, sin) of its angle" in load_robot("kinova").describe()
+    assert "a continuous joint takes its angle" in load_robot("kinova").describe()
 
 
 def test_the_description_says_if_planning_is_not_possible(tmp_path: Path, models: Path) -> None:

@@ -38,8 +38,7 @@ def describe_task(task: Task) -> str:
         lines += [f"limits of a {arm.title}, published in", *source_lines(arm)]
     for each in options.grasped:
         lines.append(f"holds {each.name!r}, {each.mass:g} kg, at {each.frame!r}")
-    if kept_from := _kept_from(task):
-        lines.append(f"keeps {options.clearance.margin:g} m from {kept_from}")
+    lines += _kept_from(task)
     lines += _end(task.start, "start", robot)
     lines += _segments(task) if task.segments else _end(task.goal, "goal", robot)
     for via in options.via:
@@ -105,14 +104,17 @@ def _frame_parts(goal: FrameGoal) -> list[str]:
     return parts
 
 
-def _kept_from(task: Task) -> str:
-    """The names of obstacles, and "itself" where links are kept apart; "" for nothing."""
-    from hovi.planning.clearance.self_collisions import names_shapes  # 10 ms
+def _kept_from(task: Task) -> list[str]:
+    """What is kept at a distance: obstacles, and "itself" where links are; or why links are not."""
+    from hovi.planning.clearance.self_collisions import not_looked_at  # 10 ms
 
-    options, robot = task.options, task.scene.robot
+    options, robot = task.options, task.planned_scene.robot
+    apart = bool(options.decided(robot).self_collision)
+    why = "" if apart or options.self_collision is not None else not_looked_at(robot)
     names = [repr(each.name) for each in options.clearance.obstacles]
-    apart = names_shapes(robot) if options.self_collision is None else options.self_collision
-    return ", ".join(names + (["itself"] if apart else []))
+    kept_from = ", ".join(names + (["itself"] if apart else []))
+    lines = [f"keeps {options.clearance.margin:g} m from {kept_from}"] if kept_from else []
+    return [*lines, why] if why else lines
 
 
 def _limits(limits: str | Limits | Mapping[str, Any]) -> str:

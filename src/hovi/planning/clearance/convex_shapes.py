@@ -38,7 +38,7 @@ def convex_geometry(robot: Robot) -> pin.GeometryModel:
         shapes = load_shapes(robot.source, "collision", mesh_hull)
         given, problem = shapes.geometry, shapes.problem
     if problem:
-        raise ModelError(f"distances to obstacles need every collision shape: {problem}")
+        raise ModelError(f"distances need every collision shape: {problem}")
     if given is None or given.ngeoms == 0:
         raise ModelError(
             f"robot {robot.name!r} has no collision shapes to compute distances from: add "

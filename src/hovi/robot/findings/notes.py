@@ -17,8 +17,8 @@ def on_groups(subject: Subject) -> Iterator[Finding]:
         yield _note(
             "group",
             names,
-            f"nq and nv differ at {some_of(names)}: a continuous joint takes (cos, sin) of its "
-            "angle, an orientation a unit quaternion (x, y, z, w)",
+            f"nq and nv differ at {some_of(names)}: a continuous joint takes its angle, "
+            "and is (cos, sin) in arrays q; an orientation takes a unit quaternion (x, y, z, w)",
         )
 
 
