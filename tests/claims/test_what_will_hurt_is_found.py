@@ -252,6 +252,23 @@ def test_inertias_are_as_they_were(
     assert read.inertias[3].isApprox(meant.inertias[3], 1e-9)
 
 
+@pytest.mark.parametrize("turned", [False, True])
+def test_lines_of_two_faults_of_a_limit_do_not_undo_each_other(
+    turned: bool, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = GOOD.replace(f'{ANGLE} effort="50" velocity="3"', 'lower="-170" upper="90" effort="50"')
+    text = text.replace('upper="0.5" effort="50"', 'upper="500" effort="0"')
+    arguments = written(tmp_path, text.replace('upper="90"', 'upper="90" velocity="0"'))
+    code, found = checked(capsys, *arguments)
+    kinds = ["range-in-degrees", "range-in-millimetres", "zero-effort", "zero-velocity"]
+    assert (code, sorted(found)) == (0, kinds)
+    for kind in kinds[::-1] if turned else kinds:
+        mended(arguments, found[kind])
+    assert checked(capsys, *arguments) == (0, {})
+    model = pin.buildModelFromUrdf(arguments[0])
+    np.testing.assert_allclose(model.upperPositionLimit[:2], [0.5, np.pi / 2], rtol=1e-5)
+
+
 def test_a_light_wrist_gets_a_rotor(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     light = HEAVY_C.replace('"1"', '"1e-4"').replace("0.01", "1e-7")
     arguments = written(tmp_path, GOOD.replace(HEAVY_C, light))

@@ -2,22 +2,51 @@
 
 from __future__ import annotations
 
+import numpy as np
+import numpy.typing as npt
+
 from hovi.robot.findings.boxes import quoted
 from hovi.robot.findings.finding import PYTHON, Line, element
 from hovi.robot.findings.subject import Subject
-from hovi.robot.space.joint_kinds import ANGLE, kind_of
+from hovi.robot.space.angle_ranges import which_in_degrees
+from hovi.robot.space.joint_kinds import ANGLE, LENGTH, kind_of
 
 TURN, STROKE = 3.1416, 0.1
 """An example of half a range of angles in [rad], and of lengths in [m]."""
 SPEED, EFFORT = "3", "100"
 """Examples of limits, in [rad/s] or [m/s] and in [N m] or [N]."""
+LONG = 50.0
+"""A range of a sliding joint, in [m], from which it looks like millimetres."""
 
 
-def limit_line(subject: Subject, joint: str, factor: float = 1.0) -> Line:
+def in_degrees(subject: Subject) -> list[str]:
+    """The joints whose range looks like degrees."""
+    names, bounds = list(subject.single), np.array(list(subject.single.values())).reshape(-1, 2)
+    return [names[i] for i in which_in_degrees(are_angles(subject), *bounds.T)]
+
+
+def are_angles(subject: Subject) -> npt.NDArray[np.bool_]:
+    """Whether the range of each single joint is one of angles."""
+    kinds = [kind_of(subject.joints[name]).units == (ANGLE,) for name in subject.single]
+    return np.array(kinds, dtype=bool)
+
+
+def in_millimetres(subject: Subject) -> dict[str, float]:
+    """The sliding joints whose range looks like millimetres, with its length."""
+    return {
+        name: high - low
+        for name, (low, high) in subject.single.items()
+        if kind_of(subject.joints[name]).units == (LENGTH,) and LONG <= high - low < 1e6
+    }
+
+
+def limit_line(subject: Subject, joint: str) -> Line:
     """The element <limit>, or limits in Python for a model without a URDF.
 
-    What the file leaves empty, or at 0, has an example. factor: of the range, 1 to keep it.
+    What the file leaves empty, or at 0, has an example, and a range in degrees or millimetres is
+    converted.
     """
+    factor = _factor(subject, joint)
     given = subject.single.get(joint, (0.0, 0.0))
     half = TURN if kind_of(subject.joints[joint]).units == (ANGLE,) else STROKE
     lower, upper = (f"{factor * x:.6g}" for x in (given if given[0] < given[1] else (-half, half)))
@@ -36,3 +65,10 @@ def limit_line(subject: Subject, joint: str, factor: float = 1.0) -> Line:
         is_kept = given[0] < given[1] and factor == 1.0
         written = {**({key: stated.get(key, "0") for key in span} if is_kept else span), **written}
     return Line(f"joint[@name={quoted(joint)}]", element("limit", written))
+
+
+def _factor(subject: Subject, joint: str) -> float:
+    """What the range of a joint is multiplied by to be in [rad] or [m]."""
+    if joint in in_degrees(subject):
+        return np.pi / 180
+    return 1e-3 if joint in in_millimetres(subject) else 1.0

@@ -8,14 +8,10 @@ import numpy as np
 
 from hovi.errors import some_of
 from hovi.robot.findings.finding import PYTHON, Finding, Line, Severity
-from hovi.robot.findings.limit_lines import limit_line
+from hovi.robot.findings.limit_lines import are_angles, in_degrees, in_millimetres, limit_line
 from hovi.robot.findings.subject import Subject
-from hovi.robot.space.angle_ranges import ranges_in_degrees, which_in_degrees
-from hovi.robot.space.joint_kinds import ANGLE, LENGTH, kind_of
+from hovi.robot.space.angle_ranges import ranges_in_degrees
 from hovi.robot.urdf.safety_controllers import soft_ranges
-
-LONG = 50.0
-"""A range of a sliding joint, in [m], from which it looks like millimetres."""
 
 
 def empty_ranges(subject: Subject) -> Iterator[Finding]:
@@ -35,25 +31,20 @@ def empty_ranges(subject: Subject) -> Iterator[Finding]:
 def degrees(subject: Subject) -> Iterator[Finding]:
     """Ranges of angles that look like degrees."""
     names, bounds = list(subject.single), np.array(list(subject.single.values())).reshape(-1, 2)
-    angles = np.array([kind_of(subject.joints[x]).units == (ANGLE,) for x in names], dtype=bool)
-    found = [names[i] for i in which_in_degrees(angles, *bounds.T)]
+    found = in_degrees(subject)
     if found:
         yield Finding(
             Severity.MISLEADS,
             "range-in-degrees",
             tuple(found),
-            ranges_in_degrees(names, angles, *bounds.T),
-            tuple(limit_line(subject, name, np.pi / 180) for name in found),
+            ranges_in_degrees(names, are_angles(subject), *bounds.T),
+            tuple(limit_line(subject, name) for name in found),
         )
 
 
 def millimetres(subject: Subject) -> Iterator[Finding]:
     """Ranges of sliding joints that look like millimetres."""
-    sliding = {
-        name: high - low
-        for name, (low, high) in subject.single.items()
-        if kind_of(subject.joints[name]).units == (LENGTH,) and LONG <= high - low < 1e6
-    }
+    sliding = in_millimetres(subject)
     if sliding:
         longest = max(sliding, key=lambda name: sliding[name])
         span = sliding[longest]
@@ -63,7 +54,7 @@ def millimetres(subject: Subject) -> Iterator[Finding]:
             tuple(sliding),
             f"the position range of {longest}, {span:g} m, looks like millimetres: "
             f"{span:g} mm are {span / 1e3:g} m",
-            tuple(limit_line(subject, name, 1e-3) for name in sliding),
+            tuple(limit_line(subject, name) for name in sliding),
         )
 
 
