@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import csv
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -389,3 +390,29 @@ def test_turns_are_given_once(scene: hovi.Scene) -> None:
 def test_degrees_of_continuous_joints_are_noticed(scene: hovi.Scene) -> None:
     with pytest.warns(UserWarning, match="wheel is 90 rad in a given configuration, which looks"):
         hovi.plan(scene, [0.0, 0.2, 0.0], [90.0, 0.3, 0.0], 30.0, limits="none", intervals=40)
+
+
+@pytest.mark.parametrize(
+    ("limits", "needed"),
+    [
+        ({"base": "none", "v": 4.0}, 8.4 / 4.0),
+        ({"base": "none", "a": 9.0}, 2 * np.sqrt(8.4 / 9.0)),
+        ({"base": "none", "v": 4.0, "a": 9.0}, 8.4 / 4.0 + 4.0 / 9.0),
+    ],
+)
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_too_little_time_for_full_turns_is_said_before_the_solve(
+    scene: hovi.Scene, limits: dict[str, Any], needed: float, side: float
+) -> None:
+    """Rest to rest by 8.4 rad, of which the shortest way would be 2.1."""
+    ends = [0.0, 0.2, 4.2 * side], [0.0, 0.2, -4.2 * side]
+    short = hovi.plan(scene, *ends, 0.97 * needed, limits=limits)
+    assert short.status == "infeasible"
+    said = re.search(r"'drill' has to move by 8\.4 rad, which takes ([\d.]+) s", short.message)
+    assert said, short.message
+    assert float(said[1]) == pytest.approx(needed, rel=5e-3)
+    enough = hovi.plan(scene, *ends, 1.05 * needed, limits=limits)
+    assert enough.success, enough.message
+    # a direction is reached the shortest way, by 2.1 rad, and no turns are missing
+    direction = [0.0, 0.2, -4.2 * side + side * TURN]
+    assert hovi.plan(scene, ends[0], direction, 0.97 * needed, limits=limits).success

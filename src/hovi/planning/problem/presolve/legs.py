@@ -18,6 +18,7 @@ from hovi.dynamics.kinematic_chain import read_kinematic_chain
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.kinematics.branches import find_branches
 from hovi.planning.problem.limits import Limits
+from hovi.planning.problem.notation.goal_turns import turns_after
 from hovi.planning.problem.presolve.least_time import Pace, Rests
 from hovi.planning.problem.presolve.reach_in_boxes import proven_out_of_reach
 from hovi.robot.robot import Robot
@@ -126,10 +127,16 @@ class Leg:
 
     @property
     def distance(self) -> Array:
-        """How far each joint has to move between two states, (nv,); 0 where an end is free."""
+        """How far each joint has to move between two states, (nv,); 0 where an end is free.
+
+        The shortest way, but to an angle of the goal that says its full turns.
+        """
         on = self.coordinates
         (q0, held), (q1, also) = self.first.position(on), self.last.position(on)
-        return np.where(held & also, on.difference(q0, q1), 0.0)
+        way = on.difference(q0, q1)
+        if self.whole and isinstance(self.first.goal, State) and isinstance(self.last.goal, State):
+            way = way + 2 * np.pi * turns_after(self.last.goal, self.first.goal, on, q0, way)
+        return np.where(held & also, way, 0.0)
 
     @property
     def needed(self) -> Array:
