@@ -298,10 +298,39 @@ def test_replan_and_advance_go_on_from_them(solution: hovi.Solution) -> None:
     np.testing.assert_allclose(solution.replan().trajectory.positions(0.0), motion.positions(0.0))
 
 
-def test_a_goal_that_is_missed_by_a_turn_is_no_success(solution: hovi.Solution) -> None:
-    elsewhere = solution.replan(start=[9.28 - TURN, 0.2, -20.0])
-    assert not elsewhere.success
-    assert "ends a full turn from the goal of 'wheel', 9.9 rad" in elsewhere.message
+@pytest.mark.parametrize(
+    ("start", "goal"),
+    [
+        ([9.28 - TURN, 0.2, -20.0], None),
+        ([9.5, 0.5, -3.0], None),
+        (None, [15.0, 0.9, -0.7]),
+        (None, [-3.5, 0.9, -13.0]),
+    ],
+)
+def test_replan_turns_as_far_as_angles_say(
+    solution: hovi.Solution, start: list[float] | None, goal: list[float] | None
+) -> None:
+    """-0.7 rad says no turns: the joint ends there or a turn off, as the last motion goes."""
+    again = solution.replan(start, goal)
+    assert again.success, again.message
+    begun, ended = again.trajectory.positions([0.0, 2.0])
+    np.testing.assert_allclose(begun, start or [9.28, 0.2, -20.0], atol=1e-9)
+    wanted = goal or [9.9, 0.9, -0.7]
+    np.testing.assert_allclose(ended[0], wanted[0], atol=1e-9)
+    if goal is not None and abs(goal[2]) > np.pi:
+        np.testing.assert_allclose(ended[2], goal[2], atol=1e-9)
+    t = np.linspace(0.0, 2.0, 9)
+    expected = integrated(again.trajectory, t, begun)
+    np.testing.assert_allclose(again.trajectory.positions(t), expected, atol=1e-3)
+
+
+def test_a_measured_start_that_was_wrapped_is_no_reason_for_a_turn(
+    solution: hovi.Solution,
+) -> None:
+    passed = solution.trajectory.positions(0.5)[0] - [TURN, 0.0, 0.0]
+    rest = solution.advance(0.5, hovi.State(passed, solution.trajectory.jet(0.5)[1][0]))
+    assert not rest.success
+    assert "ends a full turn from the goal of 'wheel', 9.9 rad" in rest.message
 
 
 def test_simulations_and_replays_of_plans_begin_there(

@@ -40,6 +40,14 @@ def guess_path(problem: TrajectoryProblem, guess: str | Trajectory | DiscretePat
     return problem.path(curve)
 
 
+def turned_on(problem: TrajectoryProblem, path: DiscretePath) -> DiscretePath:
+    """The path of a similar problem with the full turns that a goal says; itself if it has them."""
+    if not problem.coordinates.space.angles:
+        return path
+    motion = problem.trajectory(path)
+    return guess_path(problem, motion) if _turns_left(problem, motion).any() else path
+
+
 def _turns_left(problem: TrajectoryProblem, guess: Trajectory) -> Array:
     """Full turns of continuous joints by which a guess ends too early, shape (nv,).
 

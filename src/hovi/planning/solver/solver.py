@@ -26,7 +26,7 @@ from hovi.planning.problem.notation.ends import End
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.problem.tolerance import LAST_BARRIER, REMAINING_SHARE, Accuracy
 from hovi.planning.problem.units import as_time_limit, seconds
-from hovi.planning.solver.initial_path import guess_path
+from hovi.planning.solver.initial_path import guess_path, turned_on
 from hovi.planning.solver.limits.row_forces import at_instants
 from hovi.planning.solver.longer_way_back import minimized
 from hovi.planning.solver.methods.choice import method_for, method_from
@@ -143,21 +143,20 @@ class Solution(SolutionSummary):
     ) -> Solution:
         """The motion between other states, with this motion or another as the initial guess.
 
-        Precomputed functions are reused, for planning in a loop. The guess is a first-order
-        prediction, which counts as one step: see hovi.planning.solver.warm_start.
+        Functions are reused, for planning in a loop. The guess is a first-order prediction, which
+        counts as one step: see hovi.planning.solver.warm_start. Turns are as angles say.
         start, goal: as for `plan`, tables included; the goal may be Periodic, too; unchanged if
             None. A start at a frame is the configuration nearest to the old start.
         guess: an earlier solution on the same grid; this one if None. The duration is kept.
-        time_limit: for the whole call, in [s] or as "100 ms". What is left to do when it is reached
-            is the step of the solver that has begun and the end of the call. The status is then
+        time_limit: for the whole call, in [s] or as "100 ms". When it is reached, the step of the
+            solver that has begun and the end of the call are left to do. The status is then
             TIME_LIMIT, and the motion the best one that meets the ends, the limits and the
             equations to 1e-6; if there is none, this motion as it is, and the message says what it
             misses. From a start that it misses, a braking motion to rest within the limits instead,
             where one is found: its goal is where it stops.
         strict: whether a start outside its limits is refused; as planned if None.
         options: as for `solve`. Self-collision that was left out is not looked for, as `plan` does.
-        Raises InputError if this solution has no problem, UnreachableError for a start at a frame
-        that no configuration meets.
+        Raises InputError without a problem, UnreachableError for a start that nothing meets.
         """
         deadline = Deadline(as_time_limit(time_limit))
         require_known(options, Solution.replan, solve_on_grid)
@@ -167,7 +166,9 @@ class Solution(SolutionSummary):
             old.goal if goal is None else as_goal(goal, old),
         )
         central, origin = (self.central, self) if guess is None else (None, guess)
-        again = _Again(problem, origin.trajectory.path, central, self.check, origin.model)
+        path = turned_on(problem, origin.trajectory.path)
+        known = (central, origin.model) if path is origin.trajectory.path else (None, None)
+        again = _Again(problem, path, known[0], self.check, known[1])
         if self.status is Status.STATIONARY:
             options = {"method": Stationary()} | options
         return again.within(deadline, "this is the last motion", **options)
