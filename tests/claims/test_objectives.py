@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 import hovi
+from hovi.cli.application import main
 
 LINKS = "".join(
     f'<link name="{name}"><collision><origin xyz="0.25 0 0"/><geometry><box size="0.3 0.05 0.05"/>'
@@ -233,3 +234,24 @@ def test_a_file_and_a_study_have_the_key(tmp_path: Path) -> None:
     rows = hovi.Study.load(tmp_path / "out")
     expected = [6 * (x**2 + D[1] ** 2) / T**3 for x in (0.5, 1.0)]
     assert sorted(rows["cost"]) == pytest.approx(sorted(expected), rel=1e-6)
+
+
+def test_what_plays_torques_refuses_a_robot_without_inertia(
+    robots: Mapping[str, hovi.Robot], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "bare.urdf").write_text(BARE)
+    (tmp_path / "bare.toml").write_text(SCENE)
+    scene, motion = str(tmp_path / "bare.toml"), str(tmp_path / "motion.npz")
+    planned(robots["without inertia"], "acceleration").trajectory.save(motion)
+    for command in (
+        ["simulate", scene, "--plan", motion],
+        ["simulate", scene, "--plan", motion, "--feedback", "computed-torque"],
+        ["simulate", scene],
+        ["effects", scene],
+        ["check", motion, "--in", "mujoco"],
+    ):
+        assert main(command) == 2
+        said = capsys.readouterr()
+        assert "needs torques, and robot 'bare' has none, as there is no inertia at" in said.err
+        assert len(said.err.strip().splitlines()) == 1
+        assert not said.out

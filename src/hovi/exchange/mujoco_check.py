@@ -13,6 +13,7 @@ from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError, expect
 from hovi.exchange.libraries import library
 from hovi.exchange.mujoco_model import controls, left_out, mjcf, mujoco_scenes
+from hovi.scene.scene import require_inertia
 from hovi.system.dataclass import dataclass
 from hovi.system.summary import Summarized, Summary
 
@@ -67,7 +68,8 @@ def replay_in_mujoco(trajectory: Trajectory, step: float = 1e-4) -> MujocoReplay
     exponentially.
     step: the longest, in [s].
     Raises InputError for a step that is not positive or gives more than MAX_STEPS, and for a motion
-    that MuJoCo's model cannot hold; DisplayError if MuJoCo is missing.
+    that MuJoCo's model cannot hold; ModelError for a robot without inertia; DisplayError
+    if MuJoCo is missing.
     """
     expect(trajectory, Trajectory, "the trajectory of a solution")
     if not (step > 0 and trajectory.duration / step <= MAX_STEPS):
@@ -75,6 +77,8 @@ def replay_in_mujoco(trajectory: Trajectory, step: float = 1e-4) -> MujocoReplay
             f"the step must be positive and give at most {MAX_STEPS:,} steps, got {step:g} s."
         )
     scenes = mujoco_scenes(trajectory)
+    for scene, _ in scenes:
+        require_inertia(scene, "the check in MuJoCo")
     mujoco = library("mujoco", "mujoco", "the check in MuJoCo")
     lengths = trajectory.grid.steps
     counts = np.ceil(lengths / step * (1 - 1e-12)).astype(np.intp)  # of the steps in each interval

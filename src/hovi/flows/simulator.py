@@ -24,7 +24,7 @@ from hovi.flows.scheme_lagrangian import SchemeLagrangian
 from hovi.flows.stepper import Flow, flow
 from hovi.scene.casadi_lagrangian import CasadiLagrangian
 from hovi.scene.forces import Drive, ForcedLagrangian, Prescribed, Torque, scene_force
-from hovi.scene.scene import Scene
+from hovi.scene.scene import Scene, require_inertia
 from hovi.scene.standard_lagrangians import mechanics
 from hovi.schemes import galerkin
 from hovi.system.blas_threads import one_blas_thread
@@ -135,7 +135,8 @@ def simulate(
     torque: u(t), times (P,) -> (P, nv), in [N m]; a Trajectory for the torques of a plan; a
         Controller for feedback; none when None.
     intervals: N. inner_modes: r, from 0 (the midpoint rule).
-    Raises InputError or SceneError for invalid arguments, and for steps that are too long.
+    Raises InputError or SceneError for invalid arguments, and for steps that are too long, and
+    ModelError for a robot without inertia.
     """
     if not (np.isfinite(duration) and duration > 0):
         raise InputError(f"the duration must be positive and finite, got {duration} s.")
@@ -143,6 +144,7 @@ def simulate(
         raise InputError(
             f"the number of intervals must be from 1 to {MAX_INTERVALS:,}, got {intervals}."
         )
+    require_inertia(scene, "a simulation")
     free = mechanics(scene)
     forced = ForcedLagrangian(free, scene_force(scene, _drive(torque)))
     table, h = galerkin(inner_modes, 1), duration / intervals

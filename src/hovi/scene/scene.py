@@ -346,6 +346,19 @@ def require_plannable(scene: Scene, torques: bool = True) -> None:
         check_mass_matrix(scene.model)
 
 
+def require_inertia(scene: Scene, what: str) -> None:
+    """Raise ModelError for what needs torques if a joint of the scene has no inertia.
+
+    what: the subject of the message, such as "a simulation".
+    """
+    if bare := without_inertia(scene):
+        raise ModelError(
+            f"{what} needs torques, and robot {scene.robot.name!r} has none, as there is no "
+            f"inertia at joint {bare}: give the links that it moves a mass and an inertia, or the "
+            "joint a rotor by the effect armature, and plan again."
+        )
+
+
 def _passive_names(names: object) -> tuple[str, ...]:
     """Names as a tuple. Raises SceneError for anything but a list of texts."""
     if not isinstance(names, Sequence) or not all(isinstance(name, str) for name in names):

@@ -20,7 +20,7 @@ from hovi.planning.task_file.task import Task
 from hovi.planning.task_file.task_plan import plan_task
 from hovi.robot.frame_distance import FrameDistance
 from hovi.scene.evaluation_cost import seconds_per_point
-from hovi.scene.scene import Scene
+from hovi.scene.scene import Scene, require_inertia
 from hovi.system.dataclass import dataclass
 from hovi.system.deadline import Deadline, OutOfTimeError
 from hovi.system.interruption import interruptible, raise_if_interrupted, record_interrupt
@@ -127,9 +127,11 @@ def study_effects(
         of the task, at least 10 s. A KeyboardInterrupt ends the study with the trials so far.
     A candidate that fails is among `failed`, and the others are tried.
     Raises SceneError when no motion of the task itself is found and, before it is looked for, for a
-    candidate that the robot cannot have, and InputError for one at a frame that cannot move.
+    candidate that the robot cannot have, and InputError for one at a frame that cannot move;
+    ModelError for a robot without inertia, whose motion has no torques to compare.
     """
     task.require_one_motion("a study of effects")
+    require_inertia(task.scene, "a study of effects")
     report = progress or silent
     deadline, scene = Deadline(time_limit), task.scene
     tried = tuple(
