@@ -79,12 +79,12 @@ def _bounds(
     name = coordinates.coordinate_names[i]
     if not isinstance(value, str):
         return _pair(kind, name, value)
-    share = _share(kind, name, value)
     if kind == "q" or base is None:
         raise InputError(
             f"limits.{kind} of {name!r} is {value!r}, and a range of positions has no share: give "
             "a pair lower < upper, or a `margin`, which keeps clear of both ends of all ranges."
         )
+    share = _share(kind, name, value)
     lower, upper = float(base.lower[i]), float(base.upper[i])
     if np.isinf(lower) and np.isinf(upper):
         raise InputError(
