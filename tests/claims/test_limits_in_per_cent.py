@@ -176,7 +176,7 @@ def test_scene_files_take_them(folder: Path) -> None:
         ('{ elbow = "SHARE" }', '"50 %"', "line 10: limits.v of 'shoulder' is '50 %'"),
         ('v = { elbow = "SHARE" }', 'q = "50 %"', "line 10: `limits.q` must be"),
         ('base = "urdf"', 'base = "none"', "'none' has none for this joint"),
-        ("duration", 'velocity_scaling = "50 %"\nduration', 'limits={"v": "50 %"}'),
+        ("duration", 'velocity_scaling = "50 %"\nduration', 'limits = { v = "50 %" }'),
     ],
 )
 def test_scene_files_refuse_the_same_with_the_line(
@@ -228,3 +228,19 @@ def test_scalings_of_other_planners_are_answered_by_limits(scene: hovi.Scene, op
     options: dict[str, Any] = {option: 0.5}
     with pytest.raises(InputError, match=f"no option {option!r}: give limits, such as .*50 %"):
         hovi.plan(scene, HOME, AWAY, 2.0, **options)
+
+
+@pytest.mark.parametrize(
+    ("option", "said"),
+    [
+        ("--velocity-scaling", "--limits \"{v = '50 %'}\""),
+        ("--max-acceleration-scaling-factor", "--limits \"{base = 'panda', a = '50 %'}\""),
+    ],
+)
+def test_scalings_on_the_command_line_are_answered_by_what_to_type(
+    capsys: pytest.CaptureFixture[str], option: str, said: str
+) -> None:
+    assert main(["plan", "two_link", option, "50%"]) == 2
+    assert said in capsys.readouterr().err
+    assert main(["plan", "two_link", "--velocty", "50%"]) == 2
+    assert "--limits" not in capsys.readouterr().err

@@ -78,6 +78,7 @@ INERTIAL_B, INERTIAL_C = (
     for name in "bc"
 )
 SHAPE_C = '<collision><origin xyz="0 0 0.15"/><geometry><box size="0.1 0.1 0.21"/>'
+LIGHT_C = HEAVY_C.replace('"1"', '"1e-4"').replace("0.01", "1e-7")
 LOOP = '<loop_joint name="pin" type="revolute"><link1 link="a"/><link2 link="c"/></loop_joint>'
 
 BOTH = {"a", "base", "c"}
@@ -270,8 +271,7 @@ def test_lines_of_two_faults_of_a_limit_do_not_undo_each_other(
 
 
 def test_a_light_wrist_gets_a_rotor(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    light = HEAVY_C.replace('"1"', '"1e-4"').replace("0.01", "1e-7")
-    arguments = written(tmp_path, GOOD.replace(HEAVY_C, light))
+    arguments = written(tmp_path, GOOD.replace(HEAVY_C, LIGHT_C))
     code, found = checked(capsys, *arguments)
     assert code == 0
     assert found.keys() == {"light-joint"}
@@ -334,3 +334,22 @@ def test_what_is_no_robot_gets_one_sentence(
         assert told.out == ""
         assert re.fullmatch("error: .*\n", told.err)
     assert main(["info", arguments[0], "--json"]) == 2
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "kind", "after"),
+    [
+        (HEAVY_C, LIGHT_C, "light-joint", "[0.1, 0.0, 0.0]"),
+        ("</robot>", f"{LOOP}</robot>", "open-loop", "[0.1]"),
+    ],
+)
+def test_the_lines_for_a_scene_are_those_of_its_file(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], old: str, new: str, kind: str, after: str
+) -> None:
+    assert old in GOOD
+    written(tmp_path, GOOD.replace(old, new))
+    _, found = checked(capsys, scene_file(tmp_path, "", "[0.1, 0.0, 0.0]"))
+    (line,) = (each for each in found[kind]["lines"] if each["where"] == "scene file")
+    assert not any(each["where"] == "Python" for each in found[kind]["lines"])
+    _, left = checked(capsys, scene_file(tmp_path, line["text"], after))
+    assert kind not in left

@@ -115,7 +115,7 @@ def _run_with(arguments: Sequence[str] | None, output: int | None) -> int:
     except HoviError as error:
         return _report_error(str(error))
     except TyperException as error:
-        return _report_error(error.format_message())
+        return _report_error(error.format_message() + _instead(error))
     except (typer.Abort, KeyboardInterrupt):
         return 130
     except MemoryError:
@@ -123,6 +123,17 @@ def _run_with(arguments: Sequence[str] | None, output: int | None) -> int:
     except OSError as error:
         return _report_error(f"the operating system reports: {reason(error)}.")
     return code if isinstance(code, int) else 0
+
+
+def _instead(error: TyperException) -> str:
+    """What `hovi plan` takes instead of an unknown option of another planner, after a colon."""
+    option, context = getattr(error, "option_name", None), getattr(error, "ctx", None)
+    if option is None or getattr(context, "info_name", None) != "plan":
+        return ""
+    from hovi.planning.problem.notation.other_planners import COMMAND_LINE, instead_of
+
+    advice = instead_of(option.lstrip("-").replace("-", "_"), COMMAND_LINE)
+    return f": {advice}" if advice else ""
 
 
 def _with_own_warnings(others: Callable[..., None]) -> Any:

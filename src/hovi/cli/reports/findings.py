@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import re
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
@@ -25,7 +26,9 @@ _NAMED = re.compile(r"(\w+)\[@name=(['\"].*?['\"])\]")
 
 
 def findings_of(robot: Robot, model: pin.Model | None = None) -> tuple[Finding, ...]:
-    """What will hurt about a robot, the worst first. model: its own unless a scene has rotors.
+    """What will hurt about a robot, the worst first.
+
+    model: of a scene, with its rotors; lines are those of a scene file then.
 
     Raises ModelError for an SRDF that cannot be read.
     """
@@ -36,7 +39,12 @@ def findings_of(robot: Robot, model: pin.Model | None = None) -> tuple[Finding, 
     has_shapes = all(each.kind not in ("mesh", "mesh-unit") for each in found)
     if has_shapes and not robot.unplanned_joints:
         found = in_order([*found, *_collisions(robot)])
-    return tuple(each for each in found if each.severity in _HEADINGS)
+    shown = tuple(each for each in found if each.severity in _HEADINGS)
+    return shown if model is None else tuple(_in_scene_file(each) for each in shown)
+
+
+def _in_scene_file(found: Finding) -> Finding:
+    return dataclasses.replace(found, lines=tuple(line.in_scene_file for line in found.lines))
 
 
 def _collisions(robot: Robot) -> Iterator[Finding]:
@@ -115,7 +123,8 @@ def print_findings(robot: Robot, findings: tuple[Finding, ...]) -> None:
 
 def _shown(lines: tuple[Line, ...]) -> Iterator[str]:
     for line in lines[:_SHOWN]:
-        yield f"{_place(line.where)}: {line.text}"
+        text = line.text.replace("\n", "\n    ")
+        yield f"{_place(line.where)}: {text}"
     if len(lines) > _SHOWN:
         yield f"and {len(lines) - _SHOWN} more, which --json has"
 

@@ -12,7 +12,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from hovi.errors import SceneError, nearest
-from hovi.planning.problem.notation.other_planners import instead_of
+from hovi.planning.problem.notation.other_planners import TOML, instead_of
 from hovi.system.dataclass import dataclass
 
 Keys = tuple[str | int, ...]
@@ -86,7 +86,7 @@ def first_sentence(
     key = spelled(above + keys)
     kind = details["type"]
     if kind == "extra_forbidden":
-        advice = "" if above + keys[:-1] else instead_of(keys[-1])
+        advice = "" if above + keys[:-1] else instead_of(keys[-1], TOML)
         if advice:
             return toml.error(keys, f"there is no key `{key}`: {advice}")
         valid = _fields_of(_model_at(model, keys[:-1]))

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import ast
+import json
 from collections.abc import Mapping
 from enum import StrEnum
+from typing import Any
 from xml.sax.saxutils import quoteattr
 
 from hovi.system.dataclass import dataclass
 
-SRDF, PYTHON, COMMAND_LINE = "SRDF", "Python", "command line"
+SRDF, PYTHON, COMMAND_LINE, SCENE_FILE = "SRDF", "Python", "command line", "scene file"
 """Where a line is written that is no element of the URDF."""
 
 
@@ -27,11 +30,35 @@ class Line:
 
     where: the path of the element of the URDF in which it replaces the element of its tag, as
         XPath from <robot>; "." for one that is added to the robot itself; or SRDF, PYTHON,
-        COMMAND_LINE.
+        COMMAND_LINE, SCENE_FILE.
     """
 
     where: str
     text: str
+
+    @property
+    def in_scene_file(self) -> Line:
+        """The line, and one in Python as a scene file has it: a key, or the table of an effect."""
+        if self.where != PYTHON:
+            return self
+        call = ast.parse(f"options({self.text})", mode="eval").body
+        assert isinstance(call, ast.Call)
+        if call.keywords:
+            given = call.keywords[0]
+            return Line(SCENE_FILE, f"{given.arg} = {_toml(ast.literal_eval(given.value))}")
+        effect = call.args[0]
+        assert isinstance(effect, ast.Call)
+        value = _toml(ast.literal_eval(effect.args[0]))
+        return Line(SCENE_FILE, f"[effects.armature]\ninertia = {value}")
+
+
+def _toml(value: Any) -> str:
+    """A literal in TOML, on one line."""
+    if isinstance(value, dict):
+        return f"{{ {', '.join(f'{json.dumps(k)} = {_toml(x)}' for k, x in value.items())} }}"
+    if isinstance(value, list):
+        return f"[{', '.join(map(_toml, value))}]"
+    return json.dumps(value, ensure_ascii=False)
 
 
 def element(tag: str, attributes: Mapping[str, str], *inside: str) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 from hovi.checks.shapes import numbers_of
@@ -9,10 +10,18 @@ from hovi.errors import InputError
 from hovi.robot.robot import Robot
 from hovi.robot.space.coordinates import Coordinates
 
-_VELOCITIES = 'give limits, such as limits={"v": "50 %"} of those of the robot, or numbers in rad/s'
+PYTHON = {"v": 'limits={"v": "50 %"}', "a": 'limits={"base": "panda", "a": "50 %"}'}
+"""Limits in per cent of those of the robot, and of those of an arm, as written in Python."""
+TOML = {"v": 'limits = { v = "50 %" }', "a": 'limits = { base = "panda", a = "50 %" }'}
+"""The same in scene files."""
+COMMAND_LINE = {
+    "v": "--limits \"{v = '50 %'}\"",
+    "a": "--limits \"{base = 'panda', a = '50 %'}\"",
+}
+"""The same on the command line."""
+_VELOCITIES = "give limits, such as {v} of those of the robot, or numbers in rad/s"
 _ACCELERATIONS = (
-    'give limits, such as limits={"base": "panda", "a": "50 %"} of those that the maker of an arm '
-    "publishes, or numbers in rad/s^2"
+    "give limits, such as {a} of those that the maker of an arm publishes, or numbers in rad/s^2"
 )
 _OPTIONS = {
     "constraints": "conditions of your own along a motion are not supported, a stiff running cost "
@@ -25,13 +34,13 @@ _OPTIONS = {
 }
 
 
-def instead_of(option: object) -> str:
+def instead_of(option: object, limits: Mapping[str, str] = PYTHON) -> str:
     """What to give instead of an option of another planner, as a clause with its stop; "" if none.
 
-    In Python and in scene files.
+    limits: examples as they are written there: PYTHON, TOML or COMMAND_LINE.
     """
     advice = _OPTIONS.get(option) if isinstance(option, str) else None
-    return f"{advice}." if advice else ""
+    return f"{advice.format_map(limits)}." if advice else ""
 
 
 def refuse_pose(given: Any, on: Coordinates, name: str) -> None:
