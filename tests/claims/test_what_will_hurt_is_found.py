@@ -353,3 +353,21 @@ def test_the_lines_for_a_scene_are_those_of_its_file(
     assert not any(each["where"] == "Python" for each in found[kind]["lines"])
     _, left = checked(capsys, scene_file(tmp_path, line["text"], after))
     assert kind not in left
+
+
+@pytest.mark.parametrize("ending", ["urdf", "xacro"])
+def test_a_package_without_its_mesh_is_named_once(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], ending: str
+) -> None:
+    written(tmp_path / "whole", GOOD)
+    bare = tmp_path / "bare" / "shapes"
+    bare.mkdir(parents=True)
+    (bare / "package.xml").write_text("<package><name>shapes</name></package>")
+    (bare / f"arm.{ending}").write_text(GOOD)
+    _, found = checked(capsys, str(bare / f"arm.{ending}"))
+    assert found["mesh"]["sentence"].count(f"'{bare}'") == 1
+    (line,) = found["mesh"]["lines"]
+    option, folder = line["text"].split()
+    assert folder == "FOLDER_THAT_HOLDS_shapes"
+    _, left = checked(capsys, str(bare / f"arm.{ending}"), option, str(tmp_path / "whole"))
+    assert "mesh" not in left

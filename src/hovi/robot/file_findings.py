@@ -98,7 +98,8 @@ def file_findings(
     """What is found about a robot's file, the worst first. tips: its tip frames."""
     subject = _subject(model, source, tips)
     found = [each for finder in CHECKED for each in finder(subject)]
-    found += missing_meshes(subject, lambda mesh: _package_folder(mesh, source))
+    named = bool(source.package_dirs) and not source.reference.endswith(".xacro")  # has found ones
+    found += missing_meshes(subject, lambda mesh: _package_folder(mesh, source), named)
     return in_order(found)
 
 

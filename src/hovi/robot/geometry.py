@@ -309,4 +309,4 @@ def _short(filename: str) -> str:
 def _places(candidates: list[tuple[Path, Path]]) -> str:
     if not candidates:
         return f"{NOWHERE}; give package_dirs=[the folder of the package] or --package-dir"
-    return ", ".join(repr(str(root)) for root, _ in candidates)
+    return ", ".join(repr(root) for root in dict.fromkeys(str(root) for root, _ in candidates))

@@ -22,8 +22,13 @@ TINY = 0.02
 """The ratio of the largest mesh below which the unit is the centimetre."""
 
 
-def missing_meshes(subject: Subject, folder_of: Callable[[str], str]) -> Iterator[Finding]:
-    """Shapes whose meshes cannot be used. folder_of: the package folder of a mesh's file, or ""."""
+def missing_meshes(
+    subject: Subject, folder_of: Callable[[str], str], named: bool
+) -> Iterator[Finding]:
+    """Shapes whose meshes cannot be used.
+
+    folder_of: the package folder of a mesh's file, or "". named: whether package folders were.
+    """
     lost = [box for box in subject.boxes if box.problem]
     if not lost:
         return
@@ -39,17 +44,17 @@ def missing_meshes(subject: Subject, folder_of: Callable[[str], str]) -> Iterato
         links,
         f"{len(lost)} of {sum(bool(box.mesh) for box in subject.boxes)} meshes cannot be used, so "
         f"that {effect}, at {some_of(links)}: {problem}",
-        tuple(dict.fromkeys(line for box in lost for line in _folder_line(box, folder_of))),
+        tuple(dict.fromkeys(line for box in lost for line in _folder_line(box, folder_of, named))),
     )
 
 
-def _folder_line(box: ShapeBox, folder_of: Callable[[str], str]) -> Iterator[Line]:
-    """The option for a mesh that is elsewhere; none for one that its package does not have."""
+def _folder_line(box: ShapeBox, folder_of: Callable[[str], str], named: bool) -> Iterator[Line]:
+    """The option for a mesh that is elsewhere; none if the folder that was named lacks it."""
     package = box.mesh.partition("://")[2].lstrip("/").partition("/")[0]
     if "was not found" not in box.problem:
         return
     folder = folder_of(box.mesh)
-    if NOWHERE in box.problem or not package:
+    if NOWHERE in box.problem or not package or not named:
         folder = folder or (f"FOLDER_THAT_HOLDS_{package}" if package else "FOLDER")
     if folder:
         yield Line(COMMAND_LINE, f"--package-dir {folder}")
