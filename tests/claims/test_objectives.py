@@ -255,3 +255,15 @@ def test_what_plays_torques_refuses_a_robot_without_inertia(
         assert "needs torques, and robot 'bare' has none, as there is no inertia at" in said.err
         assert len(said.err.strip().splitlines()) == 1
         assert not said.out
+
+
+def test_the_effort_of_a_robot_without_inertia_is_unknown(
+    robots: Mapping[str, hovi.Robot], tmp_path: Path
+) -> None:
+    found = planned(robots["without inertia"], "acceleration")
+    assert found.effort is None
+    hovi.write_report(found, tmp_path / "bare.html")
+    assert "integral of the squared torques" not in (tmp_path / "bare.html").read_text()
+    found = planned(robots["with inertia"], "acceleration")
+    assert found.effort is not None
+    assert found.effort > 0.0

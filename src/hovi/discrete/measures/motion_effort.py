@@ -8,6 +8,7 @@ import numpy.typing as npt
 from hovi.discrete.interval_batch import IntervalBatch, interval_batches
 from hovi.discrete.interval_charts import jet_on
 from hovi.discrete.trajectory import Trajectory
+from hovi.scene.scene import without_inertia
 
 Array = npt.NDArray[np.float64]
 
@@ -18,12 +19,12 @@ def effort_of(trajectory: Trajectory) -> float | None:
     By the quadrature rule of the grid's schemes, at whose points the cost is measured, so that it
     equals a cost that is nothing but the effort. Torques have weight one; those of passive joints,
     which vanish in the limit of fine grids, are left out.
-    Returns None for a motion without torques, and for schemes of order 1, which have no
-    accelerations.
+    Returns None for a motion without torques, such as one of a robot without inertia, and for
+    schemes of order 1, which have no accelerations.
     """
     stored = trajectory.torque
     known = stored is None or stored.values.shape[2] > 0
-    if not known or trajectory.grid.order < 2:
+    if not known or trajectory.grid.order < 2 or _without_inertia(trajectory):
         return None
     active = _active(trajectory)
     total = 0.0
@@ -31,6 +32,13 @@ def effort_of(trajectory: Trajectory) -> float | None:
         tau = _torques(trajectory, batch)[:, active]
         total += 0.5 * float(batch.weights.ravel() @ np.vecdot(tau, tau))
     return total
+
+
+def _without_inertia(trajectory: Trajectory) -> bool:
+    """Whether a joint has no inertia in one of the scenes, so that its torques are not known."""
+    segments = trajectory.segments
+    scenes = (trajectory.scene,) if segments is None else segments.scenes
+    return any(scene is not None and bool(without_inertia(scene)) for scene in scenes)
 
 
 def _active(trajectory: Trajectory) -> npt.NDArray[np.bool_]:

@@ -118,7 +118,7 @@ class Solution(SolutionSummary):
         """1/2 integral |tau|^2 dt of the plain torques of the actuated joints, computed when asked.
 
         By the quadrature rule of the cost, which it equals where the cost is nothing else; weights,
-        other costs and the price of time are left out. None for a Lagrangian without torques.
+        other costs and the price of time are left out. None without torques or inertia.
         """
         return effort_of(self.trajectory)
 
