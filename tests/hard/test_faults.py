@@ -222,32 +222,33 @@ SEVERAL_SOLVES: dict[str, Sequence[str]] = {
         *("plan", "panda_reach_rich", "--starts", "1", "--tolerance", "1e-8"),
     ),
 }
-BALL_AT_GOAL = """
+BALL_ON_THE_WAY = """
 robot = "ur5"
 duration = 2.0
 limits = "none"
-obstacles = [{ kind = "sphere", position = [0.45, 0.25, 0.39], radius = 0.1 }]
+obstacles = [{ kind = "sphere", position = [0.45, 0.25, 0.69], radius = 0.1 }]
 
 [start]
 q = [0.0, -1.2, 1.2, -0.5, 0.3, 0.1]
 
 [goal]
 frame = "tool0"
-position = [0.45, 0.25, 0.25]
+position = [0.45, 0.25, 0.2]
 axis = { frame = [0, 0, 1], world = [0, 0, -1] }
 
 [[via]]
 time = 1.0
 frame = "tool0"
-position = [0.45, 0.25, 0.6]
+position = [0.45, 0.25, 0.55]
+axis = { frame = [0, 0, 1], world = [0, 0, -1] }
 """
-"""At the goal the hand is inside the ball, so the search tries one solve after another."""
+"""On the way the ball is where the wrist would be: the search tries one solve after another."""
 
 
 @pytest.mark.parametrize("command", SEVERAL_SOLVES)
 def test_one_ctrl_c_ends_a_plan_of_many_solves(command: str, tmp_path: Path) -> None:
     scene = tmp_path / "scene.toml"
-    scene.write_text(BALL_AT_GOAL)
+    scene.write_text(BALL_ON_THE_WAY)
     words = [word.format(scene=scene) for word in SEVERAL_SOLVES[command]]
     process = start(*words)
     while _processor_seconds(process.pid) < 2.5:  # imports are over, at any load of the machine

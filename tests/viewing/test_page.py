@@ -327,7 +327,7 @@ def test_a_panel_has_no_markup_of_its_text() -> None:
 
 @pytest.mark.parametrize("wrong", [3, ["x"]])
 def test_what_is_compared_must_be_motions(motion: Trajectory, wrong: Any) -> None:
-    with pytest.raises(InputError, match="trajector"):
+    with pytest.raises(InputError, match="motion"):
         replay(motion, compare=wrong)
 
 

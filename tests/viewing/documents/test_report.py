@@ -86,7 +86,7 @@ def test_the_replay_in_a_report_plays_and_no_request_leaves(report: Path, tab: T
 
 
 def test_what_is_no_motion_is_refused(tmp_path: Path, motion: Trajectory) -> None:
-    with pytest.raises(InputError, match="trajectory"):
+    with pytest.raises(InputError, match="expected a motion"):
         write_report("motion.npz", tmp_path / "r.html")  # type: ignore[arg-type]
     with pytest.raises(DisplayError, match="No such file or directory"):
         write_report(motion, tmp_path / "no" / "r.html")
