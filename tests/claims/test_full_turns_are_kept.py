@@ -185,6 +185,7 @@ def test_half_turns_are_no_edge(scene: hovi.Scene, tmp_path: Path, turns: int) -
 
 @pytest.mark.parametrize("goal", [10.3, 7.0 + TURN])
 def test_a_path_around_an_obstacle_ends_at_the_angle(scene: hovi.Scene, goal: float) -> None:
+    pytest.importorskip("ompl")
     post = hovi.Box((0.06, 0.06, 1.2), position=(0.0, 0.4, 0.6))
     ends = [7.0, 1.6, 0.0], [goal, 1.6, 0.0]
     found = hovi.plan(scene, *ends, 4.0, obstacles=[post], margin=0.01)
