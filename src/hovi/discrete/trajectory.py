@@ -297,7 +297,8 @@ class Trajectory(Positions, ExportMethods, TrajectorySummary):
             **segments,
             **({"turns": dict(self.turns)} if self.turns else {}),
         }
-        kept = trajectory_file.meshes_of(self._robots) if meshes else {}
+        robots = {id(each.robot): each.robot for each in self.scenes}.values()
+        kept = trajectory_file.meshes_of(robots) if meshes else {}
         trajectory_file.warn_of_hashes(kept)
         trajectory_file.write_arrays(path, header, arrays, kept)
 
@@ -344,9 +345,10 @@ class Trajectory(Positions, ExportMethods, TrajectorySummary):
             ) from error
 
     @property
-    def _robots(self) -> tuple[Robot, ...]:
-        scenes = (self.scene,) if self.segments is None else self.segments.scenes
-        return tuple({id(each.robot): each.robot for each in scenes if each is not None}.values())
+    def scenes(self) -> tuple[Scene, ...]:
+        """The scenes of its segments, or its own; none for a motion without one."""
+        given = (self.scene,) if self.segments is None else self.segments.scenes
+        return tuple(scene for scene in given if scene is not None)
 
     def _names(self) -> list[str]:
         return [scheme.name for scheme in self.grid.schemes]

@@ -248,7 +248,7 @@ def scene_of(
 
 
 @lru_cache(maxsize=4)
-def meshes_of(robots: tuple[Robot, ...]) -> dict[str, StoredMeshes]:
+def meshes_of(robots: Iterable[Robot]) -> dict[str, StoredMeshes]:
     """The meshes that the file of a motion keeps, by the sha256 of their URDFs."""
     return stored_meshes(robot.source for robot in robots)
 

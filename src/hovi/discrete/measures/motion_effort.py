@@ -36,9 +36,7 @@ def effort_of(trajectory: Trajectory) -> float | None:
 
 def _without_inertia(trajectory: Trajectory) -> bool:
     """Whether a joint has no inertia in one of the scenes, so that its torques are not known."""
-    segments = trajectory.segments
-    scenes = (trajectory.scene,) if segments is None else segments.scenes
-    return any(scene is not None and bool(without_inertia(scene)) for scene in scenes)
+    return any(bool(without_inertia(scene)) for scene in trajectory.scenes)
 
 
 def _active(trajectory: Trajectory) -> npt.NDArray[np.bool_]:

@@ -300,7 +300,7 @@ def _attempts(first: FirstGuesses, rows: bool, job: Job) -> Iterator[_Attempt]:
     is tried with its end held in any case.
     """
     for attempt in _free_attempts(first, rows):
-        to_branch = attempt.guess is first.all[0] and not attempt.by_path
+        to_branch = attempt.guess is first.direct and not first.paths
         goal = job.held_at(attempt.guess.q[-1]) if first.isolated or to_branch else None
         if goal is None or not first.isolated:
             yield attempt

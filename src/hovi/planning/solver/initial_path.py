@@ -34,18 +34,29 @@ def guess_path(problem: TrajectoryProblem, guess: str | Trajectory | DiscretePat
             f"the guess has {guess.v.shape[1]} velocities, but {coordinates.owner} has "
             f"{coordinates.nv}; use a motion of the same one."
         )
-    curve, turns = stretched(guess, grid.duration, problem.ld.k), _turns_left(problem, guess)
-    if turns.any():
-        curve = with_turns(curve, coordinates, grid.duration, turns)
-    return problem.path(curve)
+    return _turned_path(problem, guess, _turns_left(problem, guess))
 
 
 def turned_on(problem: TrajectoryProblem, path: DiscretePath) -> DiscretePath:
     """The path of a similar problem with the full turns that a goal says; itself if it has them."""
-    if not problem.coordinates.space.angles:
+    if not _says_turns(problem):
         return path
     motion = problem.trajectory(path)
-    return guess_path(problem, motion) if _turns_left(problem, motion).any() else path
+    turns = _turns_left(problem, motion)
+    return _turned_path(problem, motion, turns) if turns.any() else path
+
+
+def _turned_path(problem: TrajectoryProblem, guess: Trajectory, turns: Array) -> DiscretePath:
+    """A motion on the problem's grid. turns: full turns that it makes beyond its own, (nv,)."""
+    T = problem.grid.duration
+    curve = stretched(guess, T, problem.ld.k)
+    return problem.path(with_turns(curve, problem.coordinates, T, turns) if turns.any() else curve)
+
+
+def _says_turns(problem: TrajectoryProblem) -> bool:
+    """Whether the angle of a continuous joint at the goal says its full turns."""
+    goal = problem.goal
+    return isinstance(goal, State) and bool(says_turns(goal, problem.coordinates).any())
 
 
 def _turns_left(problem: TrajectoryProblem, guess: Trajectory) -> Array:
@@ -54,7 +65,7 @@ def _turns_left(problem: TrajectoryProblem, guess: Trajectory) -> Array:
     They are known where the angle of the goal says its turns.
     """
     start, goal, on = problem.start, problem.goal, problem.coordinates
-    if not isinstance(goal, State) or not says_turns(goal, on).any():
+    if not (isinstance(goal, State) and _says_turns(problem)):
         return np.zeros(on.nv)
     first, last = guess.positions([0.0, guess.duration])
     q0, q1 = problem.end_jets[0] if problem.end_jets else problem.boundary[::2]
