@@ -76,8 +76,9 @@ def folder(module: Module) -> str:
 
 
 def imports(module: Module) -> set[Module]:
-    """The modules of hovi that a module imports, inside functions and for types alone too."""
-    return {_known(name, module) for name in _imported(FILES[module]) if name[0] == "hovi"}
+    """The modules of hovi that a module imports: in functions, for types alone and by name, too."""
+    named = {_known(name, module) for name in _imported(FILES[module]) if name[0] == "hovi"}
+    return named | _by_name(FILES[module])
 
 
 def _imported(path: Path) -> Iterator[Module]:
@@ -87,6 +88,13 @@ def _imported(path: Path) -> Iterator[Module]:
         elif isinstance(node, ast.ImportFrom):
             assert not node.level, f"{path}:{node.lineno}: relative import"
             yield from ((*node.module.split("."), alias.name) for alias in node.names)
+
+
+def _by_name(path: Path) -> set[Module]:
+    """The modules that texts name, as `import_module` takes them, with a function after a colon."""
+    texts = [x.value for x in ast.walk(ast.parse(path.read_text())) if isinstance(x, ast.Constant)]
+    names = [tuple(x.split(":")[0].split(".")) for x in texts if isinstance(x, str)]
+    return {name[1:] for name in names if name[0] == "hovi" and name[1:] in NAMES}
 
 
 def _known(name: Module, importer: Module) -> Module:

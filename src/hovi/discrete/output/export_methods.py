@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import os
-from importlib import import_module
-from typing import Any
 
 from hovi.checks.arguments import check_arguments
+from hovi.discrete.output.exporter import exported
 
 Path = str | os.PathLike[str]
 
@@ -22,15 +21,15 @@ class ExportMethods:
 
     def to_csv(self, path: Path, rate: float | None = None) -> None:
         """Write t, q, v, a and tau as comma-separated values in full precision."""
-        _export(self, path, "csv", rate)
+        exported(self, path, "csv", rate)
 
     def to_numpy(self, path: Path, rate: float | None = None) -> None:
         """Write an npz archive of plain arrays."""
-        _export(self, path, "numpy", rate)
+        exported(self, path, "numpy", rate)
 
     def to_parquet(self, path: Path, rate: float | None = None) -> None:
         """Write a Parquet table."""
-        _export(self, path, "parquet", rate)
+        exported(self, path, "parquet", rate)
 
     def to_joint_trajectory(
         self, path: Path, rate: float | None = None, *, efforts: bool = False
@@ -39,29 +38,24 @@ class ExportMethods:
 
         efforts: fill in the field `effort` too, which many joint_trajectory_controllers refuse.
         """
-        _export(self, path, "joint-trajectory", rate, **({"efforts": True} if efforts else {}))
+        exported(self, path, "joint-trajectory", rate, **({"efforts": True} if efforts else {}))
 
     def to_mcap(self, path: Path, rate: float | None = None) -> None:
         """Write an MCAP file of ROS 2 messages: joint states, efforts, TF and the URDF."""
-        _export(self, path, "mcap", rate)
+        exported(self, path, "mcap", rate)
 
     def to_mujoco(self, path: Path, rate: float | None = None) -> None:
         """Write a MuJoCo model with a keyframe of positions, velocities and controls a sample."""
-        _export(self, path, "mujoco", rate)
+        exported(self, path, "mujoco", rate)
 
     def to_rerun(self, path: Path, rate: float | None = None) -> None:
         """Write a recording of the Rerun viewer: curves of the joints and the moving robot."""
-        _export(self, path, "rerun", rate)
+        exported(self, path, "rerun", rate)
 
     def to_video(self, path: Path, rate: float | None = None) -> None:
         """Write an MP4 video of the replay."""
-        _export(self, path, "video", rate)
+        exported(self, path, "video", rate)
 
     def to_gif(self, path: Path, rate: float | None = None) -> None:
         """Write a GIF of the replay."""
-        _export(self, path, "gif", rate)
-
-
-def _export(motion: Any, path: Path, format: str, rate: float | None, **options: Any) -> None:
-    """By name, as plug-ins are: formats draw and simulate, on floors above motions."""
-    import_module("hovi.exchange.formats").export(motion, path, format, rate, **options)
+        exported(self, path, "gif", rate)
