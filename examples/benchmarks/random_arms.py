@@ -17,8 +17,8 @@ import numpy.typing as npt
 import pinocchio as pin
 
 import hovi
+from hovi.optimize.criteria import Criteria
 from hovi.optimize.interior_point import minimize_bounded
-from hovi.optimize.trust_region import Options
 from hovi.planning.solver.bounded_action import BoundedAction
 from hovi.planning.solver.solver import guess_path
 from hovi.robot.example_robots import example_robot
@@ -135,9 +135,9 @@ def cold_point_solve(problem: hovi.TrajectoryProblem) -> PointSolve:
     """hovi's first interior-point solve on a problem's grid, and its processor time."""
     limits = problem.limits
     assert limits is not None
-    path, options = guess_path(problem, "cubic"), Options(decrease=1e-9, max_iterations=500)
-    seconds, found = timed(lambda: minimize_bounded(BoundedAction(problem, limits), path, options))
-    good = found.feasible and found.stop == "stationary"
+    path, criteria = guess_path(problem, "cubic"), Criteria(decrease=1e-9, max_iterations=500)
+    seconds, found = timed(lambda: minimize_bounded(BoundedAction(problem, limits), path, criteria))
+    good = found.feasible and found.why == "stationary"
     return PointSolve(found.iterations, float(found.outputs.value), seconds, good)
 
 

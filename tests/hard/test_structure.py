@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 import pytest
+from hovi.optimize.criteria import Criteria
 
 from hard import naive
 from hard.case import Case, Outcome, parameters
@@ -21,7 +22,7 @@ from hard.scenes import HANG_JET, UP_JET, hanging, links, uneven
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import DiscretePath
 from hovi.errors import HoviError
-from hovi.optimize.trust_region import Options, minimize
+from hovi.optimize.trust_region import minimize
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.search.planner import plan
 from hovi.planning.solver.action_objective import ActionObjective
@@ -91,7 +92,7 @@ def last_bits(problem: TrajectoryProblem, path: DiscretePath) -> float:
 def solve_again(problem: TrajectoryProblem, path: object) -> tuple[float, int]:
     """Change of a minimum by a solve in regularized coordinates, and its inertia there."""
     tree = ActionObjective(problem, "tree")
-    outcome = minimize(tree, path, Options(decrease=1e-9, max_iterations=20))  # type: ignore[arg-type]
+    outcome = minimize(tree, path, Criteria(decrease=1e-9, max_iterations=20))  # type: ignore[arg-type]
     return float(np.abs(outcome.x.q - path.q).max()), tree.negative_eigenvalues(outcome.x)  # type: ignore[attr-defined]
 
 

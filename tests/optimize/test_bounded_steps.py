@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 import pytest
+from hovi.optimize.criteria import Criteria
+from hovi.optimize.ended import Reason
 
 from hovi.optimize.barrier import Barrier, Bounds
 from hovi.optimize.bordered_model import EquationModel
@@ -12,7 +14,6 @@ from hovi.optimize.bounded_objective import BoundedOutcome, Refinement
 from hovi.optimize.bounded_steps import FULL_REACTION_SHARE, BoundedSteps
 from hovi.optimize.interior_point import OUTSIDE_RADIUS, minimize_bounded
 from hovi.optimize.quadratic_model import QuadraticModel
-from hovi.optimize.trust_region import Options, Stop
 from optimize.test_interior_point import DenseModel, Quadratic
 
 Array = npt.NDArray[np.float64]
@@ -60,8 +61,8 @@ def cornered(far: float) -> WithEquation:
 def steps_from(program: WithEquation, x: Array, mu: float) -> BoundedSteps[Array]:
     outputs = program.outputs(x)
     barrier = Barrier.central(program.bounds, outputs.y, mu)
-    outcome = BoundedOutcome(x, outputs, barrier, Stop.ITERATION_LIMIT)
-    steps = BoundedSteps(program, outcome, Options(radius=1e6), 1.0)
+    outcome = BoundedOutcome(x, outputs, barrier, Reason.ITERATION_LIMIT)
+    steps = BoundedSteps(program, outcome, Criteria(radius=1e6), 1.0)
     steps.cautious = True  # a plain step, whose gradient is that of the model
     return steps
 
@@ -87,8 +88,8 @@ def test_the_predicted_decrease_of_a_quadratic_program_is_the_actual_one(far: fl
     program = cornered(far)
     start = np.array([1.0, 0.5, 0.5])
     barrier = Barrier.central(program.bounds, start, 1e-6)
-    outcome = minimize_bounded(program, start, Options(), start=barrier)
-    assert outcome.stop is Stop.STATIONARY
+    outcome = minimize_bounded(program, start, Criteria(), start=barrier)
+    assert outcome.why is Reason.STATIONARY
     assert program.meets_equations(outcome.x)
     assert outcome.history[0].ratio == pytest.approx(1.0, abs=1e-6)
     x0 = min(far, 6.0)  # 2 x0 - 20 + 2 (x0 - 0.5) - 3 = 0, with x1 = 0
@@ -145,8 +146,8 @@ class Watched(Quadratic):
 def test_the_radius_is_what_it_was_once_added_outputs_are_matched() -> None:
     program = Watched(np.array([100.0, 4_000.0, 0.0, 0.0]))
     program.radii = 50.0, 50.0
-    outcome = minimize_bounded(program, np.zeros(4), Options(max_iterations=60))
-    assert outcome.stop is Stop.STATIONARY
+    outcome = minimize_bounded(program, np.zeros(4), Criteria(max_iterations=60))
+    assert outcome.why is Reason.STATIONARY
     radii = [step.radius for step in outcome.history]
     first = int(np.argmax(np.array(radii) <= OUTSIDE_RADIUS))
     assert radii[first] <= OUTSIDE_RADIUS < radii[first - 1]

@@ -6,10 +6,12 @@ import casadi as ca
 import numpy as np
 import numpy.typing as npt
 import pytest
+from hovi.optimize.criteria import Criteria
+from hovi.optimize.ended import Reason
 
 from hovi.optimize.chord_steps import MAX_CHORD_STEPS, polish
 from hovi.optimize.quadratic_model import Factor, QuadraticModel
-from hovi.optimize.trust_region import Options, Stop, minimize
+from hovi.optimize.trust_region import minimize
 from optimize.test_trust_region import Smooth
 
 Array = npt.NDArray[np.float64]
@@ -108,12 +110,12 @@ def test_an_objective_without_gradients_is_left_alone() -> None:
 
 
 def test_a_minimum_takes_fewer_models_with_gradients() -> None:
-    options = Options(decrease=1e-6, exact=True)
+    options = Criteria(decrease=1e-6, exact=True)
     with_gradients, without = valley(), valley(WithoutGradients)
     polished = minimize(with_gradients, NEARBY, options)
     plain = minimize(without, NEARBY, options)
     for outcome in (polished, plain):
-        assert outcome.stop is Stop.STATIONARY
+        assert outcome.why is Reason.STATIONARY
         assert outcome.convex
         np.testing.assert_allclose(outcome.x, MINIMUM, rtol=0, atol=1e-12)
     assert with_gradients.models == without.models - 1

@@ -9,6 +9,8 @@ import casadi as ca
 import numpy as np
 import numpy.typing as npt
 import pytest
+from hovi.optimize.criteria import Criteria
+from hovi.optimize.ended import Reason
 from scipy.linalg import cho_solve
 from scipy.optimize import linprog, minimize
 
@@ -17,7 +19,6 @@ from hovi.optimize.bounded_objective import BoundedObjective, BoundedOutcome, Ou
 from hovi.optimize.bounded_steps import LARGER_DENSITY
 from hovi.optimize.interior_point import minimize_bounded
 from hovi.optimize.quadratic_model import Factor, IntervalSum, QuadraticModel
-from hovi.optimize.trust_region import Options, Stop
 from hovi.system.deadline import OutOfTimeError
 
 Array = npt.NDArray[np.float64]
@@ -304,9 +305,9 @@ CURVED_VALLEYS = {"hock-schittkowski 1"}
 def test_the_known_minimum_is_found(name: str) -> None:
     n, f, y, lower, upper, start, minimum = PROGRAMS[name]
     outcome = minimize_bounded(
-        Program(n, f, y, lower, upper), np.array(start, dtype=float), Options()
+        Program(n, f, y, lower, upper), np.array(start, dtype=float), Criteria()
     )
-    assert outcome.stop is Stop.STATIONARY
+    assert outcome.why is Reason.STATIONARY
     assert outcome.feasible
     np.testing.assert_allclose(outcome.x, minimum, atol=2e-4)
 
@@ -315,7 +316,7 @@ def test_the_known_minimum_is_found(name: str) -> None:
 def test_gradient_and_multipliers_balance_to_rounding(name: str) -> None:
     n, f, y, lower, upper, start, _ = PROGRAMS[name]
     program = Program(n, f, y, lower, upper)
-    outcome = minimize_bounded(program, np.array(start, dtype=float), Options())
+    outcome = minimize_bounded(program, np.array(start, dtype=float), Criteria())
     gradient, jacobian = (part.full() for part in program._first(outcome.x))
     forces = jacobian.T * outcome.barrier.multipliers
     residual = np.abs(gradient.ravel() + forces.sum(axis=1)).max()
@@ -326,7 +327,7 @@ def test_gradient_and_multipliers_balance_to_rounding(name: str) -> None:
 def test_convex_programs_take_few_steps(name: str) -> None:
     n, f, y, lower, upper, start, _ = PROGRAMS[name]
     program = Program(n, f, y, lower, upper)
-    outcome = minimize_bounded(program, np.array(start, dtype=float), Options())
+    outcome = minimize_bounded(program, np.array(start, dtype=float), Criteria())
     assert outcome.iterations <= 25
 
 
@@ -334,8 +335,8 @@ def test_convex_programs_take_few_steps(name: str) -> None:
 def test_the_last_barrier_is_relative_to_the_objective_at_the_end(far: float) -> None:
     """However much more the objective is at the guess."""
     program = Program(1, lambda x: x[0] ** 2, lambda x: [x[0]], [1.0], [1e9])
-    found = minimize_bounded(program, np.array([1.0 + far]), Options(barrier=1e-6))
-    assert found.stop is Stop.STATIONARY
+    found = minimize_bounded(program, np.array([1.0 + far]), Criteria(barrier=1e-6))
+    assert found.why is Reason.STATIONARY
     assert found.outputs.value - 1.0 <= 4e-6 * LARGER_DENSITY
     assert found.barrier.mu <= 1.1e-6 * LARGER_DENSITY
 
@@ -343,7 +344,7 @@ def test_the_last_barrier_is_relative_to_the_objective_at_the_end(far: float) ->
 def test_multipliers_satisfy_the_optimality_conditions() -> None:
     """min (x - 3)^2 with x <= 1: 2 (x - 3) + z = 0, so z = 4."""
     program = Program(1, lambda x: (x[0] - 3) ** 2, lambda x: [x[0]], [0], [1])
-    outcome = minimize_bounded(program, np.array([0.5]), Options())
+    outcome = minimize_bounded(program, np.array([0.5]), Criteria())
     assert outcome.barrier.multipliers[0] == pytest.approx(4.0, rel=1e-6)
 
 
@@ -355,20 +356,20 @@ def test_curvature_that_turns_negative_in_the_last_step_is_no_end(turn: float) -
         return 1 + (1 - x[0]) ** 4 + (1 - x[0] - turn) * x[1] ** 2 + x[1] ** 4
 
     program = Program(2, f, lambda x: [x[0]], [-1e3], [1e3])
-    options = Options(decrease=1e-6, barrier=1e-9)
+    options = Criteria(decrease=1e-6, barrier=1e-9)
     outcome = minimize_bounded(program, np.array([0.0, 0.0]), options)
-    assert outcome.stop is Stop.STATIONARY
+    assert outcome.why is Reason.STATIONARY
     assert outcome.model is not None
     assert outcome.model.factor(0.0) is not None
     left = dataclasses.replace(options, escape_saddles=False)
     stopped = minimize_bounded(program, np.array([0.0, 0.0]), left)
-    assert stopped.stop is Stop.STATIONARY
+    assert stopped.why is Reason.STATIONARY
     assert stopped.model is not None
     assert stopped.model.factor(0.0) is None
     assert outcome.outputs.value < stopped.outputs.value - 1e-5
     left = dataclasses.replace(options, max_iterations=stopped.iterations)
     ended = minimize_bounded(program, np.array([0.0, 0.0]), left)  # at the saddle
-    assert ended.stop is Stop.STATIONARY
+    assert ended.why is Reason.STATIONARY
     assert ended.model is not None
     assert ended.model.factor(0.0) is None
 
@@ -378,9 +379,9 @@ def test_a_stationary_point_of_a_model_without_all_of_its_curvature_is_no_end(
     start: list[float],
 ) -> None:
     disc = Disc()
-    outcome = minimize_bounded(disc, np.array(start), Options())
+    outcome = minimize_bounded(disc, np.array(start), Criteria())
     assert disc.inexact_models > 2
-    assert outcome.stop is Stop.STATIONARY
+    assert outcome.why is Reason.STATIONARY
     assert np.allclose(outcome.x, [2.0, 0.0], atol=1e-5)  # not the saddle (-1, 0)
     assert isinstance(outcome.model, DenseModel)
     exact = disc.model(outcome.x, *outcome.barrier.condensed(outcome.outputs.y))
@@ -413,18 +414,18 @@ class Ending(Quadratic):
 def test_the_model_at_the_end_is_exact_although_it_is_not_convex() -> None:
     one = np.eye(1)
     convex, ending = (Ending(one, -one[0], one, -9 * one[0], 9 * one[0]) for _ in range(2))
-    minimize_bounded(convex, np.zeros(1), Options())
+    minimize_bounded(convex, np.zeros(1), Criteria())
     ending.last = convex.calls
-    outcome = minimize_bounded(ending, np.zeros(1), Options())
+    outcome = minimize_bounded(ending, np.zeros(1), Criteria())
     assert ending.calls == convex.calls
-    assert outcome.stop is Stop.STATIONARY
+    assert outcome.why is Reason.STATIONARY
     assert outcome.model is not None
     assert outcome.model.factor(0.0) is None
 
 
 def test_the_violation_follows_outputs_and_slacks() -> None:
     program = Program(2, lambda x: x[0] + x[1], lambda x: [x[0], x[1]], [0, 0], [1, 1])
-    outcome = minimize_bounded(program, np.array([0.5, 0.5]), Options())
+    outcome = minimize_bounded(program, np.array([0.5, 0.5]), Criteria())
     assert outcome.violation <= 1e-9
     outcome.outputs = program.outputs(outcome.x + np.array([0.25, -0.5]))
     assert outcome.violation == pytest.approx(0.5)
@@ -435,23 +436,23 @@ def test_the_violation_follows_outputs_and_slacks() -> None:
 def test_limits_and_interrupts_return_the_current_point() -> None:
     n, f, y, lower, upper, start, _ = PROGRAMS["hock-schittkowski 43, from outside"]
     x = np.array(start, dtype=float)
-    few = minimize_bounded(Program(n, f, y, lower, upper), x, Options(max_iterations=2))
-    assert few.stop is Stop.ITERATION_LIMIT
+    few = minimize_bounded(Program(n, f, y, lower, upper), x, Criteria(max_iterations=2))
+    assert few.why is Reason.ITERATION_LIMIT
     assert few.iterations == 2
 
     def interrupt(iteration: int, value: float) -> None:
         if iteration == 3:
             raise KeyboardInterrupt
 
-    stopped = minimize_bounded(Program(n, f, y, lower, upper), x, Options(), interrupt)
-    assert stopped.stop is Stop.INTERRUPTED
+    stopped = minimize_bounded(Program(n, f, y, lower, upper), x, Criteria(), interrupt)
+    assert stopped.why is Reason.INTERRUPTED
     assert stopped.iterations == 3
 
 
 def test_an_infeasible_program_is_not_reported_as_solved() -> None:
     program = Program(1, lambda x: x[0] ** 2, lambda x: [x[0], x[0]], [2, -INF], [INF, 1])
-    outcome = minimize_bounded(program, np.array([0.0]), Options(max_iterations=200))
-    assert not (outcome.stop is Stop.STATIONARY and outcome.feasible)
+    outcome = minimize_bounded(program, np.array([0.0]), Criteria(max_iterations=200))
+    assert not (outcome.why is Reason.STATIONARY and outcome.feasible)
 
 
 # Convex programs with linear outputs
@@ -463,8 +464,8 @@ def test_quadratic_programs_with_hundreds_of_bounds_converge_from_far_outside(
     n: int, R: int, seed: int
 ) -> None:
     program, start, _ = random_quadratic(seed, n, R)
-    outcome = minimize_bounded(program, start, Options())
-    assert outcome.stop is Stop.STATIONARY
+    outcome = minimize_bounded(program, start, Criteria())
+    assert outcome.why is Reason.STATIONARY
     assert outcome.feasible
     assert program.outside(outcome.x) <= 1e-8
     assert program.optimality(outcome) <= 1e-9
@@ -475,9 +476,9 @@ def test_quadratic_programs_with_hundreds_of_bounds_converge_from_far_outside(
 @pytest.mark.parametrize("seed", range(12))
 def test_minima_of_quadratic_programs_are_those_of_scipy(seed: int) -> None:
     program, start, independent = random_quadratic(seed, 8, 30)
-    outcome = minimize_bounded(program, start, Options())
+    outcome = minimize_bounded(program, start, Criteria())
     expected = independent()
-    assert outcome.stop is Stop.STATIONARY
+    assert outcome.why is Reason.STATIONARY
     assert program.outside(expected) <= 1e-9
     assert outcome.outputs.value == pytest.approx(program.value(expected), rel=1e-7)
     np.testing.assert_allclose(outcome.x, expected, atol=1e-5)
@@ -492,10 +493,10 @@ def test_minima_of_linear_programs_are_those_of_scipy(seed: int) -> None:
     lower = np.concatenate([-np.ones(n), np.full(R, -INF)])
     upper = np.concatenate([np.ones(n), random.uniform(0.2, 1.0, R)])
     program = Quadratic(np.zeros((n, n)), random.normal(size=n), A, lower, upper)
-    outcome = minimize_bounded(program, 0.1 * random.normal(size=n), Options())
+    outcome = minimize_bounded(program, 0.1 * random.normal(size=n), Criteria())
     expected = linprog(program.g, A_ub=A[n:], b_ub=upper[n:], bounds=(-1, 1))
     assert expected.success
-    assert outcome.stop is Stop.STATIONARY
+    assert outcome.why is Reason.STATIONARY
     assert outcome.outputs.value == pytest.approx(expected.fun, rel=1e-6)
     assert program.outside(outcome.x) <= 1e-8
 
@@ -508,8 +509,8 @@ def test_redundant_bounds_change_nothing(seed: int) -> None:
     many = Quadratic(
         program.H, program.g, np.tile(program.A, (5, 1)), np.tile(b.lower, 5), np.tile(b.upper, 5)
     )
-    outcome = minimize_bounded(many, start, Options())
-    assert outcome.stop is Stop.STATIONARY
+    outcome = minimize_bounded(many, start, Criteria())
+    assert outcome.why is Reason.STATIONARY
     assert outcome.iterations <= 25
     np.testing.assert_allclose(outcome.x, independent(), atol=1e-5)
 
@@ -520,8 +521,8 @@ def test_degenerate_corners_are_reached() -> None:
     program = Quadratic(
         np.eye(2), -np.array([2.0, 1.0]), A, np.full(3, -INF), np.array([1.0, 1.0, 2.0])
     )
-    outcome = minimize_bounded(program, np.array([-3.0, 0.5]), Options())
-    assert outcome.stop is Stop.STATIONARY
+    outcome = minimize_bounded(program, np.array([-3.0, 0.5]), Criteria())
+    assert outcome.why is Reason.STATIONARY
     np.testing.assert_allclose(outcome.x, [1.0, 1.0], atol=1e-4)
     assert outcome.outputs.value == pytest.approx(-2.0, abs=1e-7)
     assert outcome.iterations <= 25
@@ -530,8 +531,8 @@ def test_degenerate_corners_are_reached() -> None:
 def test_bounds_that_leave_a_narrow_gap_converge() -> None:
     A, width = np.array([[1.0, 1.0]]), 1e-6
     program = Quadratic(np.eye(2), np.zeros(2), A, np.array([2.0]), np.array([2.0 + width]))
-    outcome = minimize_bounded(program, np.array([5.0, -7.0]), Options())
-    assert outcome.stop is Stop.STATIONARY
+    outcome = minimize_bounded(program, np.array([5.0, -7.0]), Criteria())
+    assert outcome.why is Reason.STATIONARY
     np.testing.assert_allclose(outcome.x, [1.0, 1.0], atol=2 * width)
 
 
@@ -544,9 +545,9 @@ def test_bounds_that_contradict_each_other_are_told(seed: int) -> None:
     lower = np.append(program.bounds.lower, [-INF, gap])
     upper = np.append(program.bounds.upper, [0.0, INF])
     outcome = minimize_bounded(
-        Quadratic(program.H, program.g, A, lower, upper), start, Options(max_iterations=300)
+        Quadratic(program.H, program.g, A, lower, upper), start, Criteria(max_iterations=300)
     )
-    assert not (outcome.stop is Stop.STATIONARY and outcome.feasible)
+    assert not (outcome.why is Reason.STATIONARY and outcome.feasible)
     assert not outcome.feasible
 
 
@@ -557,8 +558,8 @@ def test_a_semi_infinite_program_ends_at_its_minimum() -> None:
     program = Majorant()
     root = np.sqrt(35 / 27)
     u = np.cbrt(1 + root) + np.cbrt(1 - root)
-    outcome = minimize_bounded(program, np.array([3.0, 3.0]), Options())
-    assert outcome.stop is Stop.STATIONARY
+    outcome = minimize_bounded(program, np.array([3.0, 3.0]), Criteria())
+    assert outcome.why is Reason.STATIONARY
     assert outcome.feasible
     s = np.linspace(0.0, 1.0, 100_001)
     assert (outcome.x[0] + outcome.x[1] * s - s * (2 - s)).min() >= 0
@@ -570,11 +571,11 @@ def test_a_semi_infinite_program_ends_at_its_minimum() -> None:
 
 def test_few_further_steps_are_taken_for_bounds_that_are_replaced() -> None:
     """Against those of the program with all rows from the start."""
-    found = minimize_bounded(Majorant(), np.array([3.0, 3.0]), Options())
+    found = minimize_bounded(Majorant(), np.array([3.0, 3.0]), Criteria())
     fine = Majorant(2048)
     fixed = Quadratic(fine.H, fine.g, fine.A, fine.bounds.lower, fine.bounds.upper)
-    whole = minimize_bounded(fixed, np.array([3.0, 3.0]), Options())
-    assert whole.stop is Stop.STATIONARY
+    whole = minimize_bounded(fixed, np.array([3.0, 3.0]), Criteria())
+    assert whole.why is Reason.STATIONARY
     assert found.outputs.value == pytest.approx(whole.outputs.value, abs=1e-6)
     assert found.iterations <= 2 * whole.iterations
 
@@ -586,14 +587,14 @@ def test_few_further_steps_are_taken_for_bounds_that_are_replaced() -> None:
 def test_marks_are_the_points_before_the_product_halves(seed: int) -> None:
     """They descend, the last is the solution, and each is near the minimum with its barrier."""
     program, start, _ = random_quadratic(seed, 20, 60)
-    outcome = minimize_bounded(program, start, Options(barrier=1e-8))
+    outcome = minimize_bounded(program, start, Criteria(barrier=1e-8))
     levels = np.array([level for level, _ in outcome.marks])
     assert len(levels) > 4
     assert (levels[1:] <= levels[:-1]).all()
     assert (levels[2:] < 0.5 * levels[:-2]).all()  # two in one halving: its end, and the next
     np.testing.assert_array_equal(outcome.marks[-1][1], outcome.x)
     for level, x in outcome.marks[2:]:
-        there = minimize_bounded(program, x, Options(barrier=level / density(program, start)))
+        there = minimize_bounded(program, x, Criteria(barrier=level / density(program, start)))
         assert np.abs(there.x - x).max() <= 0.3 * np.abs(outcome.x - start).max()
 
 
@@ -605,18 +606,18 @@ def density(program: Quadratic, x: Array) -> float:
 def after_a_change(seed: int, enough: float = 0.0) -> tuple[BoundedOutcome[Array], ...]:
     """Of a quadratic program whose cost has changed a little: solved warm, and cold."""
     program, start, _ = random_quadratic(seed, 20, 200)
-    first = minimize_bounded(program, start, Options(barrier=1e-8))
+    first = minimize_bounded(program, start, Criteria(barrier=1e-8))
     program.g = program.g + 1e-4 * np.random.default_rng(seed).normal(size=20)
     near = first.barrier.warm(program.bounds, first.outputs.y, first.barrier.mu, 1e-6)
-    options = Options(barrier=1e-8, enough=enough)
+    options = Criteria(barrier=1e-8, enough=enough)
     warm = minimize_bounded(program, first.x, options, start=near)
-    return warm, minimize_bounded(program, start, Options(barrier=1e-8))
+    return warm, minimize_bounded(program, start, Criteria(barrier=1e-8))
 
 
 @pytest.mark.parametrize("seed", range(4))
 def test_a_solve_from_a_solution_and_its_multipliers_takes_few_steps(seed: int) -> None:
     warm, cold = after_a_change(seed)
-    assert warm.stop is cold.stop is Stop.STATIONARY
+    assert warm.why is cold.why is Reason.STATIONARY
     assert warm.feasible
     np.testing.assert_allclose(warm.x, cold.x, atol=1e-5)
     assert warm.iterations <= 0.7 * cold.iterations
@@ -625,7 +626,7 @@ def test_a_solve_from_a_solution_and_its_multipliers_takes_few_steps(seed: int) 
 @pytest.mark.parametrize("seed", range(4))
 def test_enough_ends_a_solve_where_a_step_would_gain_less(seed: int) -> None:
     (exact, _), (rough, _) = after_a_change(seed), after_a_change(seed, 1e-4)
-    assert rough.stop is Stop.STATIONARY
+    assert rough.why is Reason.STATIONARY
     assert rough.feasible
     assert rough.iterations < exact.iterations
     assert abs(rough.outputs.value - exact.outputs.value) <= 1e-4 * abs(exact.outputs.value)
@@ -640,8 +641,8 @@ def test_out_of_time_the_best_point_within_the_bounds_is_kept(steps: int) -> Non
         if iteration == steps:
             raise OutOfTimeError
 
-    stopped = minimize_bounded(program, np.zeros(1), Options(), late)
-    assert stopped.stop is Stop.TIME_LIMIT
+    stopped = minimize_bounded(program, np.zeros(1), Criteria(), late)
+    assert stopped.why is Reason.TIME_LIMIT
     assert np.exp(stopped.x[0]) <= 2.0 * (1 + 1e-6)
     np.testing.assert_array_equal(program.outputs(stopped.x).y, stopped.outputs.y)
     if steps > 5:
@@ -657,7 +658,7 @@ def test_out_of_time_the_kept_point_has_the_outputs_of_the_last_bounds(steps: in
         if iteration == steps:
             raise OutOfTimeError
 
-    stopped = minimize_bounded(program, np.array([3.0, 3.0]), Options(), late)
+    stopped = minimize_bounded(program, np.array([3.0, 3.0]), Criteria(), late)
     np.testing.assert_allclose(stopped.outputs.y, program.outputs(stopped.x).y)
     assert stopped.barrier.s.shape == stopped.outputs.y.shape == program.bounds.lower.shape
 
@@ -675,14 +676,14 @@ def test_out_of_time_within_the_outputs_the_outcome_is_of_one_set_of_bounds(call
                 raise OutOfTimeError
             return super().outputs(x)
 
-    stopped = minimize_bounded(Slow(), np.array([3.0, 3.0]), Options())
-    assert stopped.stop in (Stop.TIME_LIMIT, Stop.STATIONARY)
+    stopped = minimize_bounded(Slow(), np.array([3.0, 3.0]), Criteria())
+    assert stopped.why in (Reason.TIME_LIMIT, Reason.STATIONARY)
     assert stopped.barrier.s.shape == stopped.barrier.zl.shape == stopped.outputs.y.shape
 
 
 def test_the_kept_point_is_the_best_one_within_the_bounds() -> None:
     bounds = Bounds(np.zeros(1), np.ones(1), np.ones(1))
-    outcome = BoundedOutcome(0, Outputs(0.0, np.zeros(1)), None, Stop.TIME_LIMIT)  # type: ignore[arg-type]
+    outcome = BoundedOutcome(0, Outputs(0.0, np.zeros(1)), None, Reason.TIME_LIMIT)  # type: ignore[arg-type]
     points = [(5.0, 0.5), (1.0, 1.1), (3.0, 1.0), (4.0, 0.2), (2.0, -1e-5)]
     for number, (value, y) in enumerate(points):
         outcome.x, outcome.outputs = number, Outputs(value, np.array([y]))

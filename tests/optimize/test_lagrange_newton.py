@@ -8,18 +8,15 @@ from itertools import pairwise
 import casadi as ca
 import numpy as np
 import pytest
+from hovi.optimize.criteria import Criteria
+from hovi.optimize.ended import Iteration, Reason
 from scipy.optimize import minimize
 
 from hovi.optimize.banded_model import BandLayout
 from hovi.optimize.constrained_model import ConstrainedModel, ConstraintRows, EqualityObjective
-from hovi.optimize.lagrange_newton import (
-    ConstrainedIteration,
-    ConstrainedOutcome,
-    minimize_under_equations,
-)
+from hovi.optimize.lagrange_newton import ConstrainedOutcome, minimize_under_equations
 from hovi.optimize.quadratic_model import IntervalSum
 from hovi.optimize.restoration import restore
-from hovi.optimize.trust_region import Options, Stop
 
 Formula = Callable[[ca.SX], ca.SX]
 
@@ -61,7 +58,7 @@ class Formulas(EqualityObjective[np.ndarray]):
 def solve(
     objective: Formulas, x: Sequence[float], penalty: float = 10.0, **options: float
 ) -> ConstrainedOutcome[np.ndarray]:
-    return minimize_under_equations(objective, np.array(x), penalty, Options(**options))
+    return minimize_under_equations(objective, np.array(x), penalty, Criteria(**options))
 
 
 def kkt_error(objective: Formulas, found: ConstrainedOutcome[np.ndarray]) -> float:
@@ -115,7 +112,7 @@ def test_the_known_minimum_is_found_where_scipy_finds_it(name: str) -> None:
     make, start, least = CASES[name]
     objective = make()
     found = solve(objective, start)
-    assert found.stop is Stop.STATIONARY
+    assert found.why is Reason.STATIONARY
     assert found.convex
     assert found.value == pytest.approx(least, abs=1e-7)
     assert kkt_error(objective, found) < 1e-7
@@ -132,7 +129,7 @@ def test_the_last_steps_converge_quadratically(name: str) -> None:
     """Every decrease, and every residual, is of the order of the last one's square."""
     make, start, _ = CASES[name]
     history = solve(make(), start).history[-4:]
-    assert all(isinstance(each, ConstrainedIteration) for each in history)
+    assert all(isinstance(each, Iteration) for each in history)
     for before, after in pairwise(history):
         assert after.ratio == 1.0
         assert after.decrease <= max(100.0 * before.decrease**2, 1e-15)
@@ -178,9 +175,9 @@ def test_a_saddle_is_left_along_negative_curvature() -> None:
 def test_a_saddle_where_one_is_to_stop_is_not_called_convex() -> None:
     objective = saddle()
     found = minimize_under_equations(
-        objective, np.array([1.0, 0.0, 0.0]), 10.0, Options(escape_saddles=False)
+        objective, np.array([1.0, 0.0, 0.0]), 10.0, Criteria(escape_saddles=False)
     )
-    assert found.stop is Stop.STATIONARY
+    assert found.why is Reason.STATIONARY
     assert not found.convex
     np.testing.assert_allclose(found.x, [1.0, 0.0, 0.0])
     model = objective.model(found.x, found.multipliers)
@@ -217,7 +214,7 @@ def test_what_cannot_be_met_is_stuck_at_a_minimum_of_the_residual(
 ) -> None:
     objective = Formulas(2, lambda x: x[0] ** 2 + x[1] ** 2, rows)
     found = solve(objective, [0.7, 0.3])
-    assert found.stop is Stop.DIVERGED
+    assert found.why is Reason.DIVERGED
     assert found.stuck
     size = np.linalg.norm(objective.evaluate(found.x)[1])
     assert size == pytest.approx(residual, abs=1e-5)
@@ -228,7 +225,7 @@ def test_what_cannot_be_met_is_stuck_at_a_minimum_of_the_residual(
 @pytest.mark.parametrize("row", [lambda x: x[0] ** 2 + 1, lambda x: ca.exp(x[0]) + 1])
 def test_an_equation_without_a_root_ends_without_a_minimum(row: Formula) -> None:
     found = solve(Formulas(2, lambda x: x[0] ** 2 + x[1] ** 2, [row]), [0.7, 0.3])
-    assert found.stop is Stop.DIVERGED
+    assert found.why is Reason.DIVERGED
     assert not found.convex
 
 
@@ -243,22 +240,22 @@ def test_known_multipliers_of_the_minimum_save_steps() -> None:
     make, start, _ = CASES["HS40"]
     cold = solve(make(), start)
     near = cold.x + 1e-5
-    warm = minimize_under_equations(make(), near, 10.0, Options(), cold.multipliers)
+    warm = minimize_under_equations(make(), near, 10.0, Criteria(), cold.multipliers)
     assert warm.iterations <= 3
     assert warm.iterations < len(solve(make(), list(near)).history)
 
 
 def test_a_start_that_is_not_finite_diverges() -> None:
     root = Formulas(2, lambda x: ca.sqrt(x[0]) + x[1] ** 2, [lambda x: x[0] - 1])
-    assert solve(root, [-1.0, 0.0]).stop is Stop.DIVERGED
+    assert solve(root, [-1.0, 0.0]).why is Reason.DIVERGED
 
 
 def test_limits_on_steps_and_time_end_the_search() -> None:
     make, start, _ = CASES["HS77"]
     few = solve(make(), start, max_iterations=2)
-    assert few.stop is Stop.ITERATION_LIMIT
+    assert few.why is Reason.ITERATION_LIMIT
     assert few.iterations == 2
-    assert solve(make(), start, time_limit=0.0).stop is Stop.TIME_LIMIT
+    assert solve(make(), start, time_limit=0.0).why is Reason.TIME_LIMIT
 
 
 def test_an_interrupt_ends_the_search_with_the_last_point() -> None:
@@ -272,7 +269,7 @@ def test_an_interrupt_ends_the_search_with_the_last_point() -> None:
 
     rows = [lambda x: (1 + x[0] ** 2) ** 2 + x[1] ** 2 - 4]
     found = solve(Interrupted(2, lambda x: ca.log(1 + x[0] ** 2) - x[1], rows), [2.0, 2.0])
-    assert found.stop is Stop.INTERRUPTED
+    assert found.why is Reason.INTERRUPTED
     assert found.iterations == 3
 
 

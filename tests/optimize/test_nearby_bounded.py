@@ -8,18 +8,19 @@ import casadi as ca
 import numpy as np
 import numpy.typing as npt
 import pytest
+from hovi.optimize.criteria import Criteria
+from hovi.optimize.ended import Reason
 
 from hovi.optimize.barrier import Bounds
 from hovi.optimize.bounded_objective import BoundedOutcome, Outputs, Refinement
 from hovi.optimize.interior_point import minimize_bounded
 from hovi.optimize.nearby_bounded import ROOM, follow_bounded
-from hovi.optimize.trust_region import Options, Stop
 from hovi.system.deadline import OutOfTimeError
 from optimize.test_interior_point import Program, Quadratic
 
 Array = npt.NDArray[np.float64]
 
-OPTIONS = Options(barrier=1e-8, enough=1e-7, max_iterations=20)
+OPTIONS = Criteria(barrier=1e-8, enough=1e-7, max_iterations=20)
 """As for replanning within limits."""
 
 
@@ -35,7 +36,7 @@ def random_problem(seed: int, move: float) -> tuple[Quadratic, Quadratic]:
 
 
 def solved(problem: Quadratic, x: Array) -> BoundedOutcome[Array]:
-    return minimize_bounded(problem, x, Options(barrier=1e-8, enough=1e-9))
+    return minimize_bounded(problem, x, Criteria(barrier=1e-8, enough=1e-9))
 
 
 def excess(problem: Quadratic, x: Array) -> float:
@@ -56,7 +57,7 @@ def test_the_solution_of_a_nearby_problem_is_found_in_a_few_steps(seed: int) -> 
     held = known.barrier.zl + known.barrier.zu > 1e-3
     assert held.sum() >= 5
     found = follow(second, known)
-    assert found.stop is Stop.STATIONARY
+    assert found.why is Reason.STATIONARY
     assert found.feasible
     assert found.iterations <= 5 < cold.iterations
     z = cold.barrier.zl + cold.barrier.zu
@@ -75,7 +76,7 @@ def test_where_the_objective_alone_is_sought_fewer_steps_give_it() -> None:
         barrier = dataclasses.replace(known.barrier, bounds=second.bounds)
         loose = dataclasses.replace(OPTIONS, enough=1e-3)
         found = follow_bounded(second, known.x, barrier, loose, most_outside=5e-3)
-        assert found.stop is Stop.STATIONARY
+        assert found.why is Reason.STATIONARY
         assert found.outputs.value == pytest.approx(cold.outputs.value, rel=1e-3)
         assert found.iterations <= whole.iterations
         fewer += whole.iterations - found.iterations
@@ -85,7 +86,7 @@ def test_where_the_objective_alone_is_sought_fewer_steps_give_it() -> None:
 def test_the_same_problem_takes_one_step() -> None:
     problem, _ = random_problem(0, 0.0)
     found = follow(problem, solved(problem, np.zeros(20)))
-    assert found.stop is Stop.STATIONARY
+    assert found.why is Reason.STATIONARY
     assert found.iterations <= 2
 
 
@@ -95,7 +96,7 @@ def test_other_bounds_hold_the_solution_after_a_larger_move() -> None:
     before, after = (each.barrier.zl + each.barrier.zu > 1e-3 for each in (known, cold))
     assert (before != after).sum() >= 4
     found = follow(second, known)
-    assert found.stop is Stop.STATIONARY
+    assert found.why is Reason.STATIONARY
     np.testing.assert_allclose(found.x, cold.x, atol=1e-6)
 
 
@@ -108,10 +109,10 @@ def test_a_point_that_is_no_minimum_is_not_found() -> None:
         [-10.0],
         [10.0],
     )
-    known = minimize_bounded(program, np.array([0.1, 2.0]), Options())
+    known = minimize_bounded(program, np.array([0.1, 2.0]), Criteria())
     start = dataclasses.replace(known.barrier, s=np.zeros(1), zl=np.zeros(1), zu=np.zeros(1))
     found = follow_bounded(program, np.zeros(2), start, OPTIONS)
-    assert found.stop is Stop.DIVERGED
+    assert found.why is Reason.DIVERGED
     assert found.iterations == 0
 
 
@@ -124,10 +125,10 @@ def test_steps_that_do_not_converge_end_soon() -> None:
         [-np.inf],
         [1.0],
     )
-    known = minimize_bounded(program, np.array([-0.5]), Options())
+    known = minimize_bounded(program, np.array([-0.5]), Criteria())
     start = dataclasses.replace(known.barrier, s=np.array([-5.0]), zu=np.zeros(1))
     found = follow_bounded(program, np.array([-2.0]), start, OPTIONS)
-    assert found.stop is Stop.DIVERGED
+    assert found.why is Reason.DIVERGED
     assert found.iterations <= 3
 
 
@@ -153,7 +154,7 @@ def test_outputs_are_refined_at_the_end() -> None:
     )
     found = follow(refined, solved(first, np.zeros(20)))
     assert refined.refinements == 1
-    assert found.stop is Stop.STATIONARY
+    assert found.why is Reason.STATIONARY
     np.testing.assert_allclose(found.x, solved(looser, np.zeros(20)).x, atol=1e-4)
 
 
@@ -173,15 +174,15 @@ class Late(Quadratic):
 @pytest.mark.parametrize(
     ("error", "stop"),
     [
-        (OutOfTimeError, Stop.TIME_LIMIT),
-        (KeyboardInterrupt, Stop.INTERRUPTED),
-        (ArithmeticError, Stop.DIVERGED),
+        (OutOfTimeError, Reason.TIME_LIMIT),
+        (KeyboardInterrupt, Reason.INTERRUPTED),
+        (ArithmeticError, Reason.DIVERGED),
     ],
 )
-def test_it_ends_with_a_point_where_it_is_stopped(error: type[BaseException], stop: Stop) -> None:
+def test_it_ends_with_a_point_where_it_is_stopped(error: type[BaseException], stop: Reason) -> None:
     first, second = random_problem(2, 0.003)
     late = Late(second.H, second.g, second.A, second.bounds.lower, second.bounds.upper)
     late.error = error
     found = follow(late, solved(first, np.zeros(20)))
-    assert found.stop is stop
+    assert found.why is stop
     assert found.iterations <= 1

@@ -9,21 +9,15 @@ import casadi as ca
 import numpy as np
 import numpy.typing as npt
 import pytest
+from hovi.optimize.criteria import Criteria
+from hovi.optimize.ended import Reason
 
 from hovi.optimize.quadratic_model import Factor, IntervalSum, QuadraticModel
-from hovi.optimize.trust_region import (
-    Objective,
-    Options,
-    Outcome,
-    Stop,
-    minimize,
-    next_radius,
-    solve_subproblem,
-)
+from hovi.optimize.trust_region import Objective, Outcome, minimize, next_radius, solve_subproblem
 
 Array = npt.NDArray[np.float64]
 
-EXACT = Options(decrease=1e-9, exact=True)
+EXACT = Criteria(decrease=1e-9, exact=True)
 
 
 @dataclass(frozen=True)
@@ -157,8 +151,8 @@ def test_the_minimum_is_found_from_a_distant_start(
     radius: float,
 ) -> None:
     problem = objective(n, f)
-    outcome = minimize(problem, np.array(start), Options(radius=radius))
-    assert outcome.stop is Stop.STATIONARY
+    outcome = minimize(problem, np.array(start), Criteria(radius=radius))
+    assert outcome.why is Reason.STATIONARY
     gradient, hessian = (x.full() for x in problem.second(outcome.x))
     assert np.abs(gradient).max() < 1e-6
     assert np.linalg.eigvalsh(hessian)[0] > -1e-9
@@ -168,14 +162,14 @@ def test_the_minimum_is_found_from_a_distant_start(
 
 
 def test_a_convex_quadratic_takes_one_step() -> None:
-    outcome = minimize(objective(3, lambda x: ca.sumsqr(x - 2) + 7), np.zeros(3), Options())
-    assert (outcome.stop, outcome.iterations) == (Stop.STATIONARY, 2)
+    outcome = minimize(objective(3, lambda x: ca.sumsqr(x - 2) + 7), np.zeros(3), Criteria())
+    assert (outcome.why, outcome.iterations) == (Reason.STATIONARY, 2)
     np.testing.assert_allclose(outcome.x, 2.0, rtol=1e-15)
 
 
 def test_a_minimum_of_value_zero_is_recognized_by_the_step() -> None:
-    outcome = minimize(objective(2, rosenbrock), np.array([1.0, 1.0]), Options())
-    assert (outcome.stop, outcome.iterations) == (Stop.STATIONARY, 1)
+    outcome = minimize(objective(2, rosenbrock), np.array([1.0, 1.0]), Criteria())
+    assert (outcome.why, outcome.iterations) == (Reason.STATIONARY, 1)
     assert outcome.value == 0.0
 
 
@@ -183,7 +177,7 @@ def test_the_history_records_every_step_and_the_value_never_increases() -> None:
     reports: list[tuple[int, float]] = []
     problem = objective(2, rosenbrock)
     outcome = minimize(
-        problem, np.array([-1.2, 1.0]), Options(), lambda i, value: reports.append((i, value))
+        problem, np.array([-1.2, 1.0]), Criteria(), lambda i, value: reports.append((i, value))
     )
     assert len(outcome.history) == outcome.iterations == len(problem.values) - 1
     assert [i for i, _ in reports] == list(range(1, outcome.iterations + 1))
@@ -211,8 +205,8 @@ def test_the_last_step_uses_an_exact_model_and_converges_to_rounding(
 ) -> None:
     x = ca.SX.sym("x", 2)
     problem = RecordingModels(x, f(x) + 1)
-    outcome = minimize(problem, np.array([0.6, 0.2]), Options(decrease=1e-9, exact=True))
-    assert outcome.stop is Stop.STATIONARY
+    outcome = minimize(problem, np.array([0.6, 0.2]), Criteria(decrease=1e-9, exact=True))
+    assert outcome.why is Reason.STATIONARY
     assert outcome.convex
     assert problem.exact[0]
     assert problem.exact[-1]
@@ -222,7 +216,7 @@ def test_the_last_step_uses_an_exact_model_and_converges_to_rounding(
 
 
 def test_only_a_minimum_is_reported_as_convex() -> None:
-    options = Options(exact=True, escape_saddles=False)
+    options = Criteria(exact=True, escape_saddles=False)
     assert not minimize(objective(2, two_wells), np.zeros(2), options).convex
     assert minimize(objective(2, two_wells), np.array([0.1, 1.0]), options).convex
 
@@ -231,16 +225,16 @@ def test_only_a_minimum_is_reported_as_convex() -> None:
 
 
 def test_a_saddle_is_left_along_negative_curvature() -> None:
-    outcome = minimize(objective(2, two_wells), np.zeros(2), Options())
-    assert outcome.stop is Stop.STATIONARY
+    outcome = minimize(objective(2, two_wells), np.zeros(2), Criteria())
+    assert outcome.why is Reason.STATIONARY
     assert outcome.value == pytest.approx(-0.25, rel=1e-14)
     np.testing.assert_allclose(np.abs(outcome.x), [0.0, 0.5**0.5], atol=1e-9)
     assert outcome.saddles_left == [0.0]
 
 
 def test_a_saddle_is_returned_if_escape_is_off() -> None:
-    outcome = minimize(objective(2, two_wells), np.zeros(2), Options(escape_saddles=False))
-    assert (outcome.stop, outcome.iterations) == (Stop.STATIONARY, 0)
+    outcome = minimize(objective(2, two_wells), np.zeros(2), Criteria(escape_saddles=False))
+    assert (outcome.why, outcome.iterations) == (Reason.STATIONARY, 0)
     np.testing.assert_array_equal(outcome.x, 0.0)
 
 
@@ -249,14 +243,16 @@ def test_a_gradient_orthogonal_to_negative_curvature_does_not_end_in_a_saddle(
     start: list[float],
 ) -> None:
     # the hard case: the valley x[1] = 0 leads to the saddle
-    outcome = minimize(objective(2, two_wells), np.array(start), Options())
-    assert outcome.stop is Stop.STATIONARY
+    outcome = minimize(objective(2, two_wells), np.array(start), Criteria())
+    assert outcome.why is Reason.STATIONARY
     assert outcome.value == pytest.approx(-0.25, rel=1e-12)
 
 
 def test_a_maximum_is_left_too() -> None:
-    outcome = minimize(objective(3, lambda x: ca.sum1(ca.cos(x))), np.zeros(3), Options(radius=1.0))
-    assert outcome.stop is Stop.STATIONARY
+    outcome = minimize(
+        objective(3, lambda x: ca.sum1(ca.cos(x))), np.zeros(3), Criteria(radius=1.0)
+    )
+    assert outcome.why is Reason.STATIONARY
     assert outcome.value == pytest.approx(-3.0, rel=1e-12)
 
 
@@ -265,8 +261,8 @@ def test_a_maximum_is_left_too() -> None:
 
 def test_the_iteration_limit_returns_the_best_so_far() -> None:
     problem = objective(2, rosenbrock)
-    outcome = minimize(problem, np.array([-1.2, 1.0]), Options(max_iterations=5))
-    assert (outcome.stop, outcome.iterations) == (Stop.ITERATION_LIMIT, 5)
+    outcome = minimize(problem, np.array([-1.2, 1.0]), Criteria(max_iterations=5))
+    assert (outcome.why, outcome.iterations) == (Reason.ITERATION_LIMIT, 5)
     assert outcome.value == min(problem.values) == problem.value(outcome.x)
 
 
@@ -280,15 +276,15 @@ def test_the_time_limit_returns_the_best_so_far(monkeypatch: pytest.MonkeyPatch)
 
     monkeypatch.setattr("hovi.system.deadline.time", Clock())
     problem = objective(2, rosenbrock)
-    outcome = minimize(problem, np.array([-1.2, 1.0]), Options(time_limit=4.5))
-    assert outcome.stop is Stop.TIME_LIMIT
+    outcome = minimize(problem, np.array([-1.2, 1.0]), Criteria(time_limit=4.5))
+    assert outcome.why is Reason.TIME_LIMIT
     assert 0 < outcome.iterations <= 4
     assert outcome.value == min(problem.values) == problem.value(outcome.x)
 
 
 def test_an_expired_time_limit_allows_no_step() -> None:
-    outcome = minimize(objective(2, rosenbrock), np.array([-1.2, 1.0]), Options(time_limit=-1.0))
-    assert (outcome.stop, outcome.iterations) == (Stop.TIME_LIMIT, 0)
+    outcome = minimize(objective(2, rosenbrock), np.array([-1.2, 1.0]), Criteria(time_limit=-1.0))
+    assert (outcome.why, outcome.iterations) == (Reason.TIME_LIMIT, 0)
 
 
 @pytest.mark.parametrize("evaluations", [2, 5, 9])
@@ -302,8 +298,8 @@ def test_an_interrupt_returns_the_best_so_far(evaluations: int) -> None:
 
     x = ca.SX.sym("x", 2)
     problem = Interrupted(x, rosenbrock(x))
-    outcome = minimize(problem, np.array([-1.2, 1.0]), Options())
-    assert outcome.stop is Stop.INTERRUPTED
+    outcome = minimize(problem, np.array([-1.2, 1.0]), Criteria())
+    assert outcome.why is Reason.INTERRUPTED
     assert outcome.iterations == evaluations - 1
     assert outcome.value == min(problem.values)
     np.testing.assert_allclose(outcome.value, float(problem.function(outcome.x)), rtol=1e-15)
@@ -315,8 +311,8 @@ def test_an_interrupt_in_the_callback_keeps_the_previous_step() -> None:
             raise KeyboardInterrupt
 
     problem = objective(2, rosenbrock)
-    outcome = minimize(problem, np.array([-1.2, 1.0]), Options(), report)
-    assert outcome.stop is Stop.INTERRUPTED
+    outcome = minimize(problem, np.array([-1.2, 1.0]), Criteria(), report)
+    assert outcome.why is Reason.INTERRUPTED
     assert outcome.value == float(problem.function(outcome.x)) <= min(problem.values[:3])
 
 
@@ -325,15 +321,15 @@ def test_an_interrupt_in_the_callback_keeps_the_previous_step() -> None:
 
 @pytest.mark.parametrize("start", [-1.0, 0.0, np.nan])
 def test_a_start_without_a_finite_value_diverges_at_once(start: float) -> None:
-    outcome = minimize(objective(1, barrier), np.array([start]), Options())
-    assert (outcome.stop, outcome.iterations) == (Stop.DIVERGED, 0)
+    outcome = minimize(objective(1, barrier), np.array([start]), Criteria())
+    assert (outcome.why, outcome.iterations) == (Reason.DIVERGED, 0)
 
 
 def test_steps_to_a_non_finite_value_are_rejected() -> None:
     problem = objective(1, lambda x: ca.sqrt(x[0]) + 0.1 / x[0])
-    outcome = minimize(problem, np.array([5.0]), Options(radius=1e3))
+    outcome = minimize(problem, np.array([5.0]), Criteria(radius=1e3))
     assert not np.isfinite(problem.values).all()
-    assert outcome.stop is Stop.STATIONARY
+    assert outcome.why is Reason.STATIONARY
     assert outcome.x[0] == pytest.approx(0.2 ** (2 / 3))
 
 
@@ -341,8 +337,8 @@ def test_steps_to_a_non_finite_value_are_rejected() -> None:
     "f", [lambda x: -(x[0] ** 4), lambda x: x[0] ** 3, lambda x: -ca.exp(x[0]), lambda x: -x[0]]
 )
 def test_an_unbounded_function_is_never_reported_as_stationary(f: Callable[[ca.SX], ca.SX]) -> None:
-    outcome = minimize(objective(1, f), np.array([-0.3]), Options(max_iterations=200))
-    assert outcome.stop in (Stop.ITERATION_LIMIT, Stop.DIVERGED)
+    outcome = minimize(objective(1, f), np.array([-0.3]), Criteria(max_iterations=200))
+    assert outcome.why in (Reason.ITERATION_LIMIT, Reason.DIVERGED)
 
 
 @pytest.mark.parametrize("part", ["gradient", "hessian"])
@@ -361,8 +357,8 @@ def test_non_finite_derivatives_end_the_iteration(part: str, bad: float) -> None
     x = ca.SX.sym("x", 2)
     problem = Broken(x, rosenbrock(x))
     with np.errstate(invalid="ignore"):
-        outcome = minimize(problem, np.array([-1.2, 1.0]), Options())
-    assert outcome.stop is Stop.DIVERGED
+        outcome = minimize(problem, np.array([-1.2, 1.0]), Criteria())
+    assert outcome.why is Reason.DIVERGED
     assert np.isfinite(outcome.x).all()
     assert outcome.value == min(value for value in problem.values if np.isfinite(value))
 
@@ -377,8 +373,8 @@ def test_wrong_derivatives_end_as_diverged() -> None:
             return DenseModel(-g.ravel(), H)
 
     x = ca.SX.sym("x", 2)
-    outcome = minimize(Uphill(x, ca.sumsqr(x) + 1), np.array([1.0, 2.0]), Options())
-    assert outcome.stop is Stop.DIVERGED
+    outcome = minimize(Uphill(x, ca.sumsqr(x) + 1), np.array([1.0, 2.0]), Criteria())
+    assert outcome.why is Reason.DIVERGED
     np.testing.assert_array_equal(outcome.x, [1.0, 2.0])
 
 
@@ -500,7 +496,7 @@ def test_only_a_stationary_point_takes_a_pure_negative_curvature_step() -> None:
 
 
 def test_outcomes_start_empty() -> None:
-    outcome = Outcome(0.0, 1.0, Stop.DIVERGED, 0)
+    outcome = Outcome(0.0, 1.0, Reason.DIVERGED, 0)
     assert outcome.history == []
     assert outcome.saddles_left == []
 
@@ -509,7 +505,7 @@ def test_outcomes_start_empty() -> None:
 def test_no_step_is_taken_once_only_rounding_remains(cubic: float) -> None:
     """Newton's iterates of 1 + x^2/2 + c x^3 are x' = 3 c x^2 / (1 + 6 c x), towards 0."""
     f = objective(1, lambda x: 1 + x[0] ** 2 / 2 + cubic * x[0] ** 3)
-    found = minimize(f, np.array([1e-3]), Options(exact=True))
+    found = minimize(f, np.array([1e-3]), Criteria(exact=True))
     iterates = [1e-3]
     for _ in range(found.iterations):
         iterates.append(3 * cubic * iterates[-1] ** 2 / (1 + 6 * cubic * iterates[-1]))
@@ -523,10 +519,10 @@ def test_it_ends_where_some_steps_together_decrease_the_value_by_a_small_share()
     start, share = np.array([-1.2, 1.0] * 5), 0.3
     problem = objective(10, chained_rosenbrock)
     first = problem.value(start)
-    whole = minimize(problem, start, Options())
-    found = minimize(problem, start, Options(stalled=share))
-    assert whole.stop is Stop.STATIONARY
-    assert found.stop is Stop.STALLED
+    whole = minimize(problem, start, Criteria())
+    found = minimize(problem, start, Criteria(stalled=share))
+    assert whole.why is Reason.STATIONARY
+    assert found.why is Reason.STALLED
     assert found.iterations < whole.iterations
     values = np.minimum.accumulate([first, *(each.value for each in found.history)])
     decreases = 1.0 - values[5:] / values[:-5]
@@ -547,7 +543,7 @@ def test_a_direction_without_a_positive_length_is_an_arithmetic_error(
 def test_slow_convergence_to_a_degenerate_minimum_goes_on() -> None:
     """Newton steps leave two thirds of the distance, and a fifth of the decrease."""
     found = minimize(objective(1, lambda x: 1 + (x - 3) ** 4), np.array([1.0]), EXACT)
-    assert found.stop is Stop.STATIONARY
+    assert found.why is Reason.STATIONARY
     assert abs(found.x[0] - 3.0) < 2e-3
     assert found.value - 1.0 < 1e-12
 
@@ -560,7 +556,7 @@ def test_values_that_rise_by_rounding_errors_do_not_stall() -> None:
             return 1.0 + 1e-15 * len(self.values) + 0.0 * super().value(x)
 
     x = ca.SX.sym("x", 1)
-    options = Options(max_iterations=8, radius=1e-12)
+    options = Criteria(max_iterations=8, radius=1e-12)
     found = minimize(Rising(x, 1e-4 * x**2), np.array([1.0]), options)
     assert found.value > 1.0 + 5e-15
-    assert found.stop is Stop.ITERATION_LIMIT
+    assert found.why is Reason.ITERATION_LIMIT

@@ -12,8 +12,8 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.optimize.barrier import Barrier, Bounds
+from hovi.optimize.ended import Iteration, Reason
 from hovi.optimize.quadratic_model import QuadraticModel
-from hovi.optimize.trust_region import Iteration, Stop
 from hovi.system.dataclass import dataclass
 from hovi.system.deadline import Deadline, OutOfTimeError
 from hovi.system.interruption import record_interrupt
@@ -25,7 +25,7 @@ X = TypeVar("X")
 FEASIBILITY_TOLERANCE = 1e-8
 """Largest |y - s| of a solution, relative to the range of a bound."""
 
-STOPPED = Stop.TIME_LIMIT, Stop.INTERRUPTED
+STOPPED = Reason.TIME_LIMIT, Reason.INTERRUPTED
 """Reasons that end the whole search."""
 
 KEPT = 1e-6
@@ -146,7 +146,7 @@ class BoundedOutcome(Generic[X]):
     x: X
     outputs: Outputs
     barrier: Barrier
-    stop: Stop
+    why: Reason
     iterations: int = 0
     history: list[Iteration] = field(default_factory=list)
     model: QuadraticModel | None = None
@@ -158,12 +158,12 @@ class BoundedOutcome(Generic[X]):
     @property
     def converged(self) -> bool:
         """Whether it ended at a stationary point within the bounds."""
-        return self.feasible and self.stop is Stop.STATIONARY
+        return self.feasible and self.why is Reason.STATIONARY
 
     @property
     def settled(self) -> bool:
         """Whether no other attempt is needed: it converged, or the whole search is stopped."""
-        return self.converged or self.stop in STOPPED
+        return self.converged or self.why in STOPPED
 
     @contextmanager
     def recorded_end(self, time_limit: float | None) -> Iterator[None]:
@@ -175,13 +175,13 @@ class BoundedOutcome(Generic[X]):
             with Deadline(time_limit).in_force():
                 yield
         except OutOfTimeError:
-            self.stop = Stop.TIME_LIMIT
+            self.why = Reason.TIME_LIMIT
             self.x, self.outputs = self.kept or (self.x, self.outputs)
         except KeyboardInterrupt:
             record_interrupt()
-            self.stop = Stop.INTERRUPTED
+            self.why = Reason.INTERRUPTED
         except ArithmeticError:
-            self.stop = Stop.DIVERGED
+            self.why = Reason.DIVERGED
 
     def keep_best(self, bounds: Bounds) -> None:
         """Keep the current point if it is within the bounds, and better than the one kept."""

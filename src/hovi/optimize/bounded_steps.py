@@ -13,8 +13,9 @@ import numpy.typing as npt
 
 from hovi.optimize.barrier import Barrier, Direction, Pair
 from hovi.optimize.bounded_objective import BoundedObjective, BoundedOutcome
+from hovi.optimize.criteria import Criteria
 from hovi.optimize.quadratic_model import QuadraticModel, next_radius
-from hovi.optimize.trust_region import Options, Trial, solve_subproblem
+from hovi.optimize.trust_region import Trial, solve_subproblem
 from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
@@ -78,7 +79,7 @@ class BoundedStep:
 class BoundedSteps(Generic[X]):
     """The steps of an interior point: plain ones of one mu, and corrected ones that lower it.
 
-    objective: with its bounds. outcome: the current point and its barrier. options: see Options.
+    objective: with its bounds. outcome: the current point and its barrier. criteria: see Criteria.
     density: mean density of the objective, its scale.
     """
 
@@ -86,15 +87,15 @@ class BoundedSteps(Generic[X]):
         self,
         objective: BoundedObjective[X],
         outcome: BoundedOutcome[X],
-        options: Options,
+        criteria: Criteria,
         density: float,
     ) -> None:
         self.objective = objective
         self.outcome = outcome
-        self.options = options
+        self.criteria = criteria
         self.density = density
         self.product = outcome.barrier.mean_product()
-        self.radius = options.radius
+        self.radius = criteria.radius
         self.shift = 0.0
         self.penalty = 0.0
         self.cautious = False
@@ -234,12 +235,12 @@ class BoundedSteps(Generic[X]):
     def final_mu(self) -> float:
         """The last mu, for the first mean density, or the present one where that is far smaller."""
         share = LARGER_DENSITY * self.scale() / (self.density * self._measure)
-        return self.options.barrier * self.density * min(max(share, LEAST_DENSITY), 1.0)
+        return self.criteria.barrier * self.density * min(max(share, LEAST_DENSITY), 1.0)
 
     @property
     def noise(self) -> float:
         """Change of the merit function that is none."""
-        return 1e-2 * self.options.decrease * self.scale()
+        return 1e-2 * self.criteria.decrease * self.scale()
 
     @property
     def _measure(self) -> float:

@@ -41,8 +41,9 @@ from hovi.optimize.bounded_objective import (
     Refinement,
 )
 from hovi.optimize.bounded_steps import MATCHED, SHORT_SHARE, BoundedStep, BoundedSteps
+from hovi.optimize.criteria import Criteria
+from hovi.optimize.ended import Iteration, Reason
 from hovi.optimize.quadratic_model import QuadraticModel, decrease_ratio, next_shift
-from hovi.optimize.trust_region import Iteration, Options, Stop
 from hovi.system.deadline import raise_if_late
 from hovi.system.interruption import raise_if_interrupted
 
@@ -108,7 +109,7 @@ SLOW_DECREASE, LARGE_VIOLATION = 0.1, 1e-3
 def minimize_bounded(
     objective: BoundedObjective[X],
     x: X,
-    options: Options,
+    criteria: Criteria,
     report: Callable[[int, float], None] | None = None,
     start: Barrier | None = None,
     plain: bool = False,
@@ -124,14 +125,14 @@ def minimize_bounded(
         density = 1.0
     barrier = start or Barrier.central(objective.bounds, outputs.y, INITIAL_MU * density)
     cold, warm = objective.radii
-    options = dataclasses.replace(options, radius=cold if start is None else warm)
-    outcome = BoundedOutcome(x, outputs, barrier, Stop.ITERATION_LIMIT)
+    criteria = dataclasses.replace(criteria, radius=cold if start is None else warm)
+    outcome = BoundedOutcome(x, outputs, barrier, Reason.ITERATION_LIMIT)
     if not np.isfinite(outputs.value):
-        outcome.stop = Stop.DIVERGED
+        outcome.why = Reason.DIVERGED
         return outcome
     outcome.keep_best(objective.bounds)
-    with outcome.recorded_end(options.time_limit):
-        _Iteration(objective, outcome, options, density, report, plain).run()
+    with outcome.recorded_end(criteria.time_limit):
+        _Iteration(objective, outcome, criteria, density, report, plain).run()
     return outcome
 
 
@@ -142,12 +143,12 @@ class _Iteration(BoundedSteps[X]):
         self,
         objective: BoundedObjective[X],
         outcome: BoundedOutcome[X],
-        options: Options,
+        criteria: Criteria,
         density: float,
         report: Callable[[int, float], None] | None,
         plain: bool,
     ) -> None:
-        super().__init__(objective, outcome, options, density)
+        super().__init__(objective, outcome, criteria, density)
         self.plain = self.cautious = plain
         self.report = report
         self.stalled = self.unmet = 0
@@ -163,7 +164,7 @@ class _Iteration(BoundedSteps[X]):
         raise_if_interrupted()
         raise_if_late()
         model = self.model()
-        while self.outcome.iterations < self.options.max_iterations:
+        while self.outcome.iterations < self.criteria.max_iterations:
             raise_if_interrupted()
             raise_if_late()
             step = self.step(model)
@@ -187,7 +188,7 @@ class _Iteration(BoundedSteps[X]):
                 if self.outcome.x is self.saddle:
                     return self._end(model)
                 if not self._reopened():
-                    self.outcome.stop = Stop.DIVERGED
+                    self.outcome.why = Reason.DIVERGED
                     return
                 refined = True
             if accepted or refined:
@@ -265,7 +266,7 @@ class _Iteration(BoundedSteps[X]):
 
     def _end(self, model: QuadraticModel) -> None:
         """End at a stationary point with its exact model."""
-        self.outcome.stop, self.outcome.model = Stop.STATIONARY, model
+        self.outcome.why, self.outcome.model = Reason.STATIONARY, model
 
     def _leave_saddle(self) -> bool:
         """Prepare for steps along negative curvature, which turned up at the end; False for none.
@@ -273,7 +274,7 @@ class _Iteration(BoundedSteps[X]):
         None follow where a saddle is to be an end, and after the last of MAX_SADDLES.
         """
         self.saddles, self.saddle, self.stalled = self.saddles + 1, self.outcome.x, 0
-        return self.options.escape_saddles and self.saddles <= MAX_SADDLES
+        return self.criteria.escape_saddles and self.saddles <= MAX_SADDLES
 
     def _is_hopeless(self) -> bool:
         """Whether the bounds seem impossible to meet from here."""
@@ -316,7 +317,7 @@ class _Iteration(BoundedSteps[X]):
     def _finished(self, step: BoundedStep, accepted: bool) -> bool:
         """Whether the last step, of the last mu, predicts next to nothing for its whole length."""
         last = step.barrier.mu <= 1.01 * self.final_mu and self.product <= 10.0 * self.final_mu
-        enough = max(self.options.decrease, self.options.enough) * self.scale()
+        enough = max(self.criteria.decrease, self.criteria.enough) * self.scale()
         whole = accepted and step.share >= WHOLE_STEP
         small = step.remaining <= SHORT_STEP_SHARE * enough
         if whole:

@@ -19,9 +19,11 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.optimize.constrained_model import ConstrainedModel, EqualityObjective, size_of
+from hovi.optimize.criteria import Criteria
+from hovi.optimize.ended import Iteration, Reason
 from hovi.optimize.quadratic_model import Factor
 from hovi.optimize.restoration import restore
-from hovi.optimize.trust_region import Iteration, Options, Outcome, Stop
+from hovi.optimize.trust_region import Outcome
 from hovi.system.dataclass import dataclass
 from hovi.system.deadline import Deadline, OutOfTimeError, raise_if_late
 from hovi.system.interruption import raise_if_interrupted, record_interrupt
@@ -68,16 +70,6 @@ REMAINING_DECREASE = 1e-26
 """Estimated relative decrease that may remain after the last step."""
 
 
-@dataclass(frozen=True)
-class ConstrainedIteration(Iteration):
-    """One step; its decrease is |s.H s| / 2 + |y.c|, its ratio the share that was accepted.
-
-    residual: |c| before the step. radius: length of the whole step.
-    """
-
-    residual: float
-
-
 @dataclass()
 class ConstrainedOutcome(Outcome[X]):
     """The final point with its multipliers.
@@ -95,7 +87,7 @@ def minimize_under_equations(
     objective: EqualityObjective[X],
     x: X,
     penalty: float,
-    options: Options,
+    criteria: Criteria,
     multipliers: Array | None = None,
     report: Callable[[int, float], None] | None = None,
 ) -> ConstrainedOutcome[X]:
@@ -106,21 +98,21 @@ def minimize_under_equations(
     """
     value, residual = objective.evaluate(x)
     start = np.zeros_like(residual) if multipliers is None else multipliers
-    first = x, value, Stop.ITERATION_LIMIT, 0
+    first = x, value, Reason.ITERATION_LIMIT, 0
     outcome = ConstrainedOutcome(*first, multipliers=start, penalty=penalty)
     if not math.isfinite(value) or not np.isfinite(residual).all():
-        outcome.stop = Stop.DIVERGED
+        outcome.why = Reason.DIVERGED
         return outcome
     try:
-        with Deadline(options.time_limit).in_force():
-            _Search(objective, outcome, residual, options, report).run()
+        with Deadline(criteria.time_limit).in_force():
+            _Search(objective, outcome, residual, criteria, report).run()
     except OutOfTimeError:
-        outcome.stop = Stop.TIME_LIMIT
+        outcome.why = Reason.TIME_LIMIT
     except KeyboardInterrupt:
         record_interrupt()
-        outcome.stop = Stop.INTERRUPTED
+        outcome.why = Reason.INTERRUPTED
     except (ArithmeticError, np.linalg.LinAlgError):
-        outcome.stop = Stop.DIVERGED
+        outcome.why = Reason.DIVERGED
     return outcome
 
 
@@ -158,14 +150,14 @@ class _Search(Generic[X]):
         objective: EqualityObjective[X],
         outcome: ConstrainedOutcome[X],
         residual: Array,
-        options: Options,
+        criteria: Criteria,
         report: Callable[[int, float], None] | None,
     ) -> None:
         self.objective = objective
         self.outcome = outcome
         self.residual = residual
         self.size = size_of(residual)
-        self.options = options
+        self.criteria = criteria
         self.report = report
         self.max_penalty = MAX_PENALTY_RATIO * outcome.penalty
         first = max(1.0, self.size)
@@ -178,7 +170,7 @@ class _Search(Generic[X]):
 
     def run(self) -> None:
         """Steps until a stop."""
-        while self.outcome.iterations < self.options.max_iterations:
+        while self.outcome.iterations < self.criteria.max_iterations:
             raise_if_interrupted()
             raise_if_late()
             self.exact = self.decrease <= EXACT_DECREASE
@@ -221,7 +213,7 @@ class _Search(Generic[X]):
         decrease = 0.5 * curvature + abs(float(new @ c))
         relative = decrease / max(abs(outcome.value), 1e-300)
         self.decrease = relative
-        settled = self.exact and relative <= self.options.decrease
+        settled = self.exact and relative <= self.criteria.decrease
         settled = settled and self.objective.feasible(outcome.x)
         if settled and shift > 0.0:
             return self._at_saddle(model, factor, shift)
@@ -229,9 +221,7 @@ class _Search(Generic[X]):
         outcome.iterations += 1
         value, share = (outcome.value, 0.0) if trial is None else (trial.value, trial.share)
         length, residual = model.length(step), self.size
-        outcome.history.append(
-            ConstrainedIteration(value, decrease, share, shift, length, residual)
-        )
+        outcome.history.append(Iteration(value, decrease, share, shift, length, residual))
         if self.report is not None:
             self.report(outcome.iterations, value)
         if trial is None:
@@ -252,7 +242,7 @@ class _Search(Generic[X]):
 
     def _ended(self, x: X) -> bool:
         """End in a minimum."""
-        self.outcome.stop, self.outcome.convex = Stop.STATIONARY, True
+        self.outcome.why, self.outcome.convex = Reason.STATIONARY, True
         return True
 
     def _move(self, trial: _Trial) -> None:
@@ -317,32 +307,32 @@ class _Search(Generic[X]):
 
     def _restore(self) -> bool:
         """Make the residual alone smaller, and begin again there; whether that succeeded."""
-        outcome, left = self.outcome, self.options.max_iterations - self.outcome.iterations
+        outcome, left = self.outcome, self.criteria.max_iterations - self.outcome.iterations
         self.restorations += 1
-        outcome.stop = Stop.DIVERGED
+        outcome.why = Reason.DIVERGED
         if self.restorations > MAX_RESTORATIONS:
             return False
         found = restore(self.objective, outcome.x, left)
         outcome.x, outcome.value, self.residual = found.x, found.value, found.residual
         self.size = size_of(found.residual)
         for size, step in zip(found.residuals, found.lengths, strict=True):
-            outcome.history.append(ConstrainedIteration(found.value, 0.0, 1.0, 0.0, step, size))
+            outcome.history.append(Iteration(found.value, 0.0, 1.0, 0.0, step, size))
         outcome.iterations += len(found.residuals)
         outcome.stuck = found.stuck
         if found.stuck:
             return False
         outcome.multipliers = found.multipliers
         self.filter, self.shift, self.before = _Filter(), 0.0, math.inf
-        outcome.stop = Stop.ITERATION_LIMIT
+        outcome.why = Reason.ITERATION_LIMIT
         return True
 
     def _at_saddle(self, model: ConstrainedModel, factor: Factor, shift: float) -> bool:
         """Leave a saddle along negative curvature; whether the iteration ends instead."""
         outcome = self.outcome
-        outcome.stop = Stop.STATIONARY
+        outcome.why = Reason.STATIONARY
         along = self._lowest(model, factor)
         curvature = float(along @ model.hessian_product(along))
-        if not self.options.escape_saddles or curvature >= 0.0:
+        if not self.criteria.escape_saddles or curvature >= 0.0:
             return True
         trial = self._along_curvature(model, factor, along, curvature)
         if trial is None:
@@ -351,12 +341,10 @@ class _Search(Generic[X]):
         outcome.iterations += 1
         decrease = outcome.value - trial.value
         radius = trial.share
-        outcome.history.append(
-            ConstrainedIteration(trial.value, decrease, 1.0, shift, radius, self.size)
-        )
+        outcome.history.append(Iteration(trial.value, decrease, 1.0, shift, radius, self.size))
         self._move(trial)
         self.filter, self.before = _Filter(), math.inf
-        outcome.stop = Stop.ITERATION_LIMIT
+        outcome.why = Reason.ITERATION_LIMIT
         return False
 
     def _lowest(self, model: ConstrainedModel, factor: Factor) -> Array:
@@ -373,10 +361,10 @@ class _Search(Generic[X]):
         self, model: ConstrainedModel, factor: Factor, along: Array, curvature: float
     ) -> _Trial | None:
         """A point on c = 0 with a smaller value, along a direction of negative curvature."""
-        outcome, length = self.outcome, self.options.radius
+        outcome, length = self.outcome, self.criteria.radius
         none = np.zeros_like(model.gradient)
         weight = 2.0 * float(np.linalg.norm(outcome.multipliers))
-        while length > LEAST_SHARE * self.options.radius:
+        while length > LEAST_SHARE * self.criteria.radius:
             step = length * along
             x = self.objective.retract(outcome.x, step, model)
             value, residual = self.objective.evaluate(x)

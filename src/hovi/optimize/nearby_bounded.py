@@ -25,8 +25,9 @@ import numpy.typing as npt
 
 from hovi.optimize.barrier import Barrier
 from hovi.optimize.bounded_objective import BoundedObjective, BoundedOutcome
+from hovi.optimize.criteria import Criteria
+from hovi.optimize.ended import Iteration, Reason
 from hovi.optimize.quadratic_model import QuadraticModel
-from hovi.optimize.trust_region import Iteration, Options, Stop
 from hovi.system.deadline import raise_if_late
 from hovi.system.interruption import raise_if_interrupted
 
@@ -52,7 +53,7 @@ def follow_bounded(
     objective: BoundedObjective[X],
     x: X,
     known: Barrier,
-    options: Options,
+    criteria: Criteria,
     report: Callable[[int, float], None] | None = None,
     most_outside: float = ROOM,
 ) -> BoundedOutcome[X]:
@@ -60,16 +61,16 @@ def follow_bounded(
 
     It ends as DIVERGED where the steps do not converge, or not to a minimum.
     known: of the solution of a similar problem with as many outputs.
-    options: `barrier` is the last barrier parameter; it ends where the next step predicts, and the
+    criteria: `barrier` is the last barrier parameter; it ends where the next step predicts, and the
         distance of slacks from outputs means, less than `enough` of the objective.
     most_outside: how far outputs may be outside their bounds at the end, relative to the range; if
         more than ROOM, only the objective is wanted, and outputs are not refined.
     """
-    outcome = BoundedOutcome(x, objective.outputs(x), known, Stop.DIVERGED)
+    outcome = BoundedOutcome(x, objective.outputs(x), known, Reason.DIVERGED)
     if not np.isfinite(outcome.outputs.value):
         return outcome
-    with outcome.recorded_end(options.time_limit):
-        _Newton(objective, outcome, options, report, most_outside).run()
+    with outcome.recorded_end(criteria.time_limit):
+        _Newton(objective, outcome, criteria, report, most_outside).run()
     return outcome
 
 
@@ -80,16 +81,16 @@ class _Newton(Generic[X]):
         self,
         objective: BoundedObjective[X],
         outcome: BoundedOutcome[X],
-        options: Options,
+        criteria: Criteria,
         report: Callable[[int, float], None] | None,
         most_outside: float,
     ) -> None:
         self.objective, self.outcome, self.most_outside = objective, outcome, most_outside
-        self.options, self.report = options, report
+        self.criteria, self.report = criteria, report
         outputs, bounds = outcome.outputs, objective.bounds.shrunk(ROOM)
         known = dataclasses.replace(outcome.barrier, bounds=bounds)
         self.density = abs(outputs.value) / objective.bounds.measure
-        self.last_mu = options.barrier * self.density
+        self.last_mu = criteria.barrier * self.density
         self.weight = GAP_WEIGHT * self.density
         outside = float(known.outside(outputs.y).max(initial=0.0))
         apart = float(np.max(np.abs(outputs.y - known.s), initial=0.0))
@@ -116,10 +117,10 @@ class _Newton(Generic[X]):
                     continue
                 barrier = dataclasses.replace(outcome.barrier, bounds=self.objective.bounds)
                 outcome.barrier = barrier.at_outputs(outcome.outputs.y)
-                outcome.model, outcome.stop = model, Stop.STATIONARY
+                outcome.model, outcome.why = model, Reason.STATIONARY
                 outcome.marks.append((outcome.barrier.mu, outcome.x))
                 return
-            if outcome.iterations >= self.options.max_iterations:
+            if outcome.iterations >= self.criteria.max_iterations:
                 return
             self._take(step, -0.5 * slope, math.sqrt(max(length, 0.0)), model)
 
@@ -148,7 +149,7 @@ class _Newton(Generic[X]):
         outcome = self.outcome
         if outcome.iterations == 0 or outcome.barrier.mu > self.last_mu:
             return False
-        enough = max(self.options.decrease, self.options.enough) * abs(outcome.outputs.value)
+        enough = max(self.criteria.decrease, self.criteria.enough) * abs(outcome.outputs.value)
         return self.outside <= self.most_outside and max(decrease, self.work) <= enough
 
     def _refined(self) -> bool:

@@ -12,13 +12,14 @@ from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable
 from dataclasses import field
-from enum import StrEnum
 from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
 from hovi.optimize.chord_steps import REMAINING_DECREASE, polish
+from hovi.optimize.criteria import Criteria
+from hovi.optimize.ended import Iteration, Reason
 from hovi.optimize.quadratic_model import (
     Factor,
     QuadraticModel,
@@ -36,25 +37,14 @@ X = TypeVar("X")
 MAX_FACTORIZATIONS = 30
 """Maximum number of factorisations per subproblem."""
 EXACT_MODEL_DECREASE = 1e-5
-"""Relative decrease of a Newton step below which models are exact, if Options.exact."""
+"""Relative decrease of a Newton step below which models are exact, if Criteria.exact."""
 SIZE_TEST_LENGTH = 1e-4
 """Step length, relative to the first radius, up to which the relative size is evaluated."""
 LAST_DECREASE, SLOWEST = 1e-14, 0.7
 """Relative predicted decrease below which an exact Newton step is the last in any case, and ratio
 of successive ones above which steps do not converge."""
 STALLED_STEPS = 5
-"""See Options.stalled."""
-
-
-class Stop(StrEnum):
-    """Why the iteration ended."""
-
-    STATIONARY = "stationary"
-    ITERATION_LIMIT = "iteration_limit"
-    TIME_LIMIT = "time_limit"
-    INTERRUPTED = "interrupted"
-    DIVERGED = "diverged"
-    STALLED = "stalled"
+"""Number of steps that Criteria.stalled compares."""
 
 
 class Objective(ABC, Generic[X]):
@@ -84,52 +74,6 @@ class Objective(ABC, Generic[X]):
         """The largest component of a step relative to the size of the data."""
 
 
-@dataclass(frozen=True)
-class Options:
-    """Tolerances and limits.
-
-    decrease: stop when a Newton step predicts a smaller decrease, relative to the value; what
-        remains after it is of the order of its square.
-    step: stop when a Newton step is smaller than this, relative to the data.
-    max_iterations: number of steps, rejected ones included. time_limit: in [s], or None.
-    radius: first radius of the trust region, in the metric; with bounds: BoundedObjective.radii.
-    escape_saddles: leave a saddle along negative curvature; False stops there.
-    exact: stop only where rounding alone remains, after a Newton step of an exact model.
-    near: whether the first iterate is near a solution, so that a barrier begins small.
-    barrier: its last parameter, relative to the mean density of the objective.
-    enough: with bounds, stop within them where a whole Newton step predicts a smaller decrease,
-        relative to the value, even if it would be cut short.
-    stalled: without bounds, stop where STALLED_STEPS steps decrease the value by a smaller share.
-    """
-
-    decrease: float = 1e-11
-    step: float = 1e-13
-    max_iterations: int = 500
-    time_limit: float | None = None
-    radius: float = 10.0
-    escape_saddles: bool = True
-    exact: bool = False
-    near: bool = False
-    barrier: float = 1e-10
-    enough: float = 0.0
-    stalled: float = 0.0
-
-
-@dataclass(frozen=True)
-class Iteration:
-    """One accepted or rejected step.
-
-    value: the objective after the step. decrease: predicted by the model. ratio: actual over
-        predicted decrease. shift: multiplier of the radius. radius: before the step.
-    """
-
-    value: float
-    decrease: float
-    ratio: float
-    shift: float
-    radius: float
-
-
 @dataclass()
 class Outcome(Generic[X]):
     """The final point and why the iteration ended.
@@ -141,7 +85,7 @@ class Outcome(Generic[X]):
 
     x: X
     value: float
-    stop: Stop
+    why: Reason
     iterations: int
     history: list[Iteration] = field(default_factory=list)
     saddles_left: list[float] = field(default_factory=list)
@@ -173,49 +117,49 @@ class Trial(NamedTuple):
 def minimize(
     objective: Objective[X],
     x: X,
-    options: Options,
+    criteria: Criteria,
     report: Callable[[int, float], None] | None = None,
 ) -> Outcome[X]:
     """Minimise from x; a KeyboardInterrupt ends it with the best point so far."""
     value = objective.value(x)
-    outcome = Outcome(x, value, Stop.ITERATION_LIMIT, 0)
+    outcome = Outcome(x, value, Reason.ITERATION_LIMIT, 0)
     if not math.isfinite(value):
-        outcome.stop = Stop.DIVERGED
+        outcome.why = Reason.DIVERGED
         return outcome
     try:
-        with Deadline(options.time_limit).in_force():
-            _iterate(objective, outcome, options, report)
+        with Deadline(criteria.time_limit).in_force():
+            _iterate(objective, outcome, criteria, report)
     except OutOfTimeError:
-        outcome.stop = Stop.TIME_LIMIT
+        outcome.why = Reason.TIME_LIMIT
     except KeyboardInterrupt:
         record_interrupt()
-        outcome.stop = Stop.INTERRUPTED
+        outcome.why = Reason.INTERRUPTED
     except ArithmeticError:
-        outcome.stop = Stop.DIVERGED
+        outcome.why = Reason.DIVERGED
     return outcome
 
 
 def _iterate(
     objective: Objective[X],
     outcome: Outcome[X],
-    options: Options,
+    criteria: Criteria,
     report: Callable[[int, float], None] | None,
 ) -> None:
     raise_if_interrupted()
     raise_if_late()
-    radius, shift = options.radius, 0.0
+    radius, shift = criteria.radius, 0.0
     values = deque([outcome.value], STALLED_STEPS + 1)
     model, exact, before = objective.model(outcome.x, None, None), True, math.inf
-    while outcome.iterations < options.max_iterations:
+    while outcome.iterations < criteria.max_iterations:
         raise_if_interrupted()
         raise_if_late()
         trial = solve_subproblem(model, radius, shift)
-        stationary = _is_stationary(objective, outcome, model, trial, options)
-        if stationary and trial.along_negative_curvature and not options.escape_saddles:
-            outcome.stop = Stop.STATIONARY
+        stationary = _is_stationary(objective, outcome, model, trial, criteria)
+        if stationary and trial.along_negative_curvature and not criteria.escape_saddles:
+            outcome.why = Reason.STATIONARY
             return
         settled = stationary and trial.newton
-        last = settled and _is_last(outcome, trial, exact, before, options)
+        last = settled and _is_last(outcome, trial, exact, before, criteria)
         candidate = objective.retract(outcome.x, trial.step, model)
         value = objective.value(candidate)
         noise = 1e-14 * abs(outcome.value)
@@ -235,21 +179,21 @@ def _iterate(
             if polished is not None:
                 last, (outcome.x, outcome.value) = True, polished
         if last or (settled and not accepted):
-            outcome.stop, outcome.convex, outcome.model = Stop.STATIONARY, exact, model
+            outcome.why, outcome.convex, outcome.model = Reason.STATIONARY, exact, model
             return
         values.append(outcome.value)
-        gained, enough = values[0] - values[-1], options.stalled * abs(values[0])
+        gained, enough = values[0] - values[-1], criteria.stalled * abs(values[0])
         if len(values) > STALLED_STEPS and gained < enough and enough > 0.0:
-            outcome.stop = Stop.STALLED
+            outcome.why = Reason.STALLED
             return
         shift = next_shift(trial.shift, trial.norm, radius)
         if accepted:
             before = trial.decrease if trial.newton else math.inf
-            exact = options.exact and (settled or before <= EXACT_MODEL_DECREASE * abs(value))
+            exact = criteria.exact and (settled or before <= EXACT_MODEL_DECREASE * abs(value))
             known = (None, None) if exact else (model, trial.step)
             model = objective.model(outcome.x, *known)
-        elif radius < 1e-14 * options.radius:
-            outcome.stop = Stop.DIVERGED
+        elif radius < 1e-14 * criteria.radius:
+            outcome.why = Reason.DIVERGED
             return
 
 
@@ -258,33 +202,33 @@ def _is_stationary(
     outcome: Outcome[X],
     model: QuadraticModel,
     trial: Trial,
-    options: Options,
+    criteria: Criteria,
 ) -> bool:
     """Whether the gradient is zero to working precision; says nothing about the curvature."""
     if trial.along_negative_curvature:
         return True
     if not trial.newton:
         return False
-    if trial.decrease <= options.decrease * abs(outcome.value):
+    if trial.decrease <= criteria.decrease * abs(outcome.value):
         return True
-    short = trial.norm <= SIZE_TEST_LENGTH * options.radius
-    return short and objective.relative_size(outcome.x, trial.step, model) <= options.step
+    short = trial.norm <= SIZE_TEST_LENGTH * criteria.radius
+    return short and objective.relative_size(outcome.x, trial.step, model) <= criteria.step
 
 
 def _is_last(
-    outcome: Outcome[X], trial: Trial, exact: bool, before: float, options: Options
+    outcome: Outcome[X], trial: Trial, exact: bool, before: float, criteria: Criteria
 ) -> bool:
     """Whether the Newton step from a stationary point is accurate enough to be the last one.
 
     The decrease that remains after it is decrease^3 / before^2 by quadratic convergence; where
-    there is no convergence, rounding dominates. See Options.exact.
+    there is no convergence, rounding dominates. See Criteria.exact.
     exact: whether the model is exact. before: predicted decrease of the previous step, infinite
         if that was not a Newton step.
     """
     size, decrease = abs(outcome.value), trial.decrease
-    if not options.exact or not exact:
-        return not options.exact
-    most = min(options.decrease * size, SLOWEST * before)
+    if not criteria.exact or not exact:
+        return not criteria.exact
+    most = min(criteria.decrease * size, SLOWEST * before)
     if decrease <= LAST_DECREASE * size or decrease > most:
         return True
     return before < math.inf and decrease * (decrease / before) ** 2 <= REMAINING_DECREASE * size

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import pinocchio as pin
+from hovi.optimize.criteria import Criteria
 
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import DiscretePath, Grid
 from hovi.discrete.state import State
-from hovi.optimize.trust_region import Options, Outcome, minimize
+from hovi.optimize.trust_region import Outcome, minimize
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.augmented_lagrangian_rounds import MAX_STUCK, minimize_constrained
@@ -33,7 +34,7 @@ def test_what_cannot_be_met_is_given_up_after_two_penalties_without_effect() -> 
     ) -> Outcome[DiscretePath]:
         penalties.append(known.torque_penalty)
         objective = ActionObjective(problem, multipliers=known)
-        return minimize(objective, x, Options(decrease=decrease))
+        return minimize(objective, x, Criteria(decrease=decrease))
 
     path = guess_path(problem, "cubic")
     found = minimize_constrained(problem, path, minimize_round)

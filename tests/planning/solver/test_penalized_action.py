@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from hovi.optimize.criteria import Criteria
 
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import DiscretePath, Grid
 from hovi.discrete.state import State
-from hovi.optimize.trust_region import Options
 from hovi.planning.problem.limits import as_limits
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.bounded_action import BoundedAction
@@ -100,7 +100,7 @@ def test_the_least_violation_of_a_mean_velocity_above_its_bound(arm_scene: Scene
     ld = DiscreteLagrangian(arm_scene.effort_lagrangian(), Grid.uniform(1.0, 16, galerkin(2)))
     problem = TrajectoryProblem(ld, State([-1.2, 0.2], [1.2, 0.0]), State([0.0, 0.2], [1.2, 0.0]))
     limited = BoundedAction(problem, as_limits(arm_scene.robot, {"base": "none", "v": 1.0}))
-    found = least_violation(limited, guess_path(problem, "cubic"), 1.0, Options())
+    found = least_violation(limited, guess_path(problem, "cubic"), 1.0, Criteria())
     assert found.least
     assert 0.01 <= found.squares <= 0.0115
     assert found.value == pytest.approx(ld.action(found.path), rel=1e-12)
@@ -113,6 +113,6 @@ def test_bounds_that_a_motion_can_meet_have_no_least_violation(arm_scene: Scene)
     limited = BoundedAction(problem, as_limits(arm_scene.robot, {"base": "none", "v": 1.4}))
     guess = guess_path(problem, "cubic")
     assert PenalizedAction(limited, 1.0).violation(guess) > 0.1
-    found = least_violation(limited, guess, 1.0, Options())
+    found = least_violation(limited, guess, 1.0, Criteria())
     assert not found.least
     assert found.violation < 1e-3

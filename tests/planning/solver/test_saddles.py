@@ -9,12 +9,13 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 import pytest
+from hovi.optimize.criteria import Criteria
+from hovi.optimize.ended import Reason
 
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import DiscretePath, Grid
 from hovi.discrete.state import State
 from hovi.effects import Gravity
-from hovi.optimize.trust_region import Options, Stop
 from hovi.planning.problem.goals import Via
 from hovi.planning.problem.limits import as_limits
 from hovi.planning.problem.problem import TrajectoryProblem
@@ -104,10 +105,10 @@ def stopped(problem: TrajectoryProblem, convex: TrajectoryProblem) -> StopsAnywh
     """A search at the minimum of `convex`, whose first joint moves like that of the problem."""
     assert problem.limits is not None
     path = guess_path(problem, "cubic")
-    first = BoundedSearch(convex, problem.limits, Options(), None, path)
+    first = BoundedSearch(convex, problem.limits, Criteria(), None, path)
     found = first.solve(path)
-    assert found.stop is Stop.STATIONARY
-    search = StopsAnywhere(problem, problem.limits, Options(), None, path)
+    assert found.why is Reason.STATIONARY
+    search = StopsAnywhere(problem, problem.limits, Criteria(), None, path)
     search.rows = first.rows
     condensed = found.barrier.condensed(found.outputs.y)
     found.model = search.objective(None).model(found.x, *condensed)

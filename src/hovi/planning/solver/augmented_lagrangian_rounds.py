@@ -8,7 +8,7 @@ from typing import Generic, Protocol, TypeVar
 import numpy as np
 
 from hovi.discrete.grid import DiscretePath
-from hovi.optimize.trust_region import Stop
+from hovi.optimize.ended import Reason
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.multipliers import Multipliers, Residuals
@@ -47,7 +47,7 @@ class Minimized(Protocol):
     """The result of one round: its final point and why it ended."""
 
     x: DiscretePath
-    stop: Stop
+    why: Reason
 
 
 Result = TypeVar("Result", bound=Minimized)
@@ -95,7 +95,7 @@ def minimize_constrained(
         path = result.x
         residuals = ActionObjective(problem, multipliers=multipliers).residuals(path)
         sizes = residuals.torque_share, residuals.node_error
-        if result.stop is not Stop.STATIONARY or within(
+        if result.why is not Reason.STATIONARY or within(
             residuals, TORQUE_TOLERANCE, NODE_TOLERANCE
         ):
             break
@@ -119,11 +119,11 @@ def minimize_constrained(
         decrease = float(np.clip(max(sizes) ** 2, 1e-12, FIRST_DECREASE))
         last = sizes
     reason = ""
-    if result.stop is Stop.STATIONARY and not within(
+    if result.why is Reason.STATIONARY and not within(
         residuals, FEASIBLE_RESIDUAL, FEASIBLE_RESIDUAL
     ):
         reason = unmet_sentence(problem, path, residuals)
-    elif result.stop is Stop.STATIONARY:
+    elif result.why is Reason.STATIONARY:
         reason = spurious_sentence(problem, path)
     return ConstrainedResult(result, multipliers, residuals, reason)
 

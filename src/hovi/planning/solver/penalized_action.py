@@ -13,8 +13,10 @@ import numpy.typing as npt
 
 from hovi.discrete.grid import DiscretePath
 from hovi.optimize.bounded_objective import Outputs
+from hovi.optimize.criteria import Criteria
+from hovi.optimize.ended import Reason
 from hovi.optimize.quadratic_model import QuadraticModel
-from hovi.optimize.trust_region import Objective, Options, Stop, minimize
+from hovi.optimize.trust_region import Objective, minimize
 from hovi.planning.solver.bounded_action import BoundedAction
 from hovi.system.dataclass import dataclass
 
@@ -91,21 +93,21 @@ class LeastViolation:
     squares: float
     least: bool
     steps: int
-    stop: Stop
+    why: Reason
 
 
 def least_violation(
-    limited: BoundedAction, path: DiscretePath, density: float, options: Options
+    limited: BoundedAction, path: DiscretePath, density: float, criteria: Criteria
 ) -> LeastViolation:
     """Minimise the violation of limits from a motion, as far as it decreases quickly.
 
-    density: mean density of the action. options: for the remaining time.
+    density: mean density of the action. criteria: for the remaining time.
     """
     penalized = PenalizedAction(limited, LEAST_VIOLATION_PENALTY * density)
-    steps = min(MAX_STEPS, options.max_iterations)
-    options = dataclasses.replace(options, max_iterations=steps, stalled=STALLED)
-    found = minimize(penalized, path, options)
+    steps = min(MAX_STEPS, criteria.max_iterations)
+    criteria = dataclasses.replace(criteria, max_iterations=steps, stalled=STALLED)
+    found = minimize(penalized, path, criteria)
     squares, violation = penalized.squares(found.x), penalized.violation(found.x)
     action = found.value - 0.5 * penalized.penalty * squares
-    least = found.stop in (Stop.STALLED, Stop.STATIONARY) and action <= OUTWEIGHED * found.value
-    return LeastViolation(found.x, action, violation, squares, least, found.iterations, found.stop)
+    least = found.why in (Reason.STALLED, Reason.STATIONARY) and action <= OUTWEIGHED * found.value
+    return LeastViolation(found.x, action, violation, squares, least, found.iterations, found.why)

@@ -19,8 +19,9 @@ from hovi.discrete.measures.motion_effort import effort_of
 from hovi.discrete.state import Periodic
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError
+from hovi.optimize.criteria import Criteria
+from hovi.optimize.ended import Iteration, Reason
 from hovi.optimize.quadratic_model import QuadraticModel
-from hovi.optimize.trust_region import Iteration, Options, Stop
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.notation.ends import End
 from hovi.planning.problem.problem import TrajectoryProblem
@@ -349,7 +350,7 @@ def solve_on_grid(
             f"method {type(method).__name__} does not support this problem; leave `method` out."
         )
     path = guess_path(problem, guess)
-    options = Options(
+    criteria = Criteria(
         decrease=STATIONARY_DECREASE,
         max_iterations=max_iterations,
         time_limit=time_limit,
@@ -361,12 +362,12 @@ def solve_on_grid(
     started = time.perf_counter()
     try:
         with Deadline(time_limit).in_force():
-            result = minimized(method, problem, path, options, report)
+            result = minimized(method, problem, path, criteria, report)
     except KeyboardInterrupt:  # outside the iterations, which return their current point
         record_interrupt()
-        result = _the_guess(problem, path, Stop.INTERRUPTED)
+        result = _the_guess(problem, path, Reason.INTERRUPTED)
     except OutOfTimeError:
-        result = _the_guess(problem, path, Stop.TIME_LIMIT)
+        result = _the_guess(problem, path, Reason.TIME_LIMIT)
     return solution_of(result, started - began, time.perf_counter() - started)
 
 
@@ -393,8 +394,8 @@ def solution_of(result: MethodResult, setup_seconds: float, solve_seconds: float
     )
 
 
-def _the_guess(problem: TrajectoryProblem, path: DiscretePath, stop: Stop) -> MethodResult:
+def _the_guess(problem: TrajectoryProblem, path: DiscretePath, why: Reason) -> MethodResult:
     """The guess, if a solve was stopped before any step."""
-    status, reason = unfinished(stop)
+    status, reason = unfinished(why)
     message = f"{reason}; the motion is the guess."
     return MethodResult(problem, path, cost_of(problem, path), status, message)

@@ -8,7 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.discrete.grid import DiscretePath
-from hovi.optimize.trust_region import Outcome, Stop
+from hovi.optimize.ended import Reason
+from hovi.optimize.trust_region import Outcome
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.non_finite import non_finite_sentence
 
@@ -49,16 +50,16 @@ def chart_sentence(problem: TrajectoryProblem, path: DiscretePath) -> str:
 
 
 _UNFINISHED = {
-    Stop.ITERATION_LIMIT: (Status.ITERATION_LIMIT, "the iteration limit was reached"),
-    Stop.TIME_LIMIT: (Status.TIME_LIMIT, "the time limit was reached"),
-    Stop.INTERRUPTED: (Status.INTERRUPTED, "the solve was interrupted"),
-    Stop.DIVERGED: (Status.DIVERGED, "no step decreases the cost"),
+    Reason.ITERATION_LIMIT: (Status.ITERATION_LIMIT, "the iteration limit was reached"),
+    Reason.TIME_LIMIT: (Status.TIME_LIMIT, "the time limit was reached"),
+    Reason.INTERRUPTED: (Status.INTERRUPTED, "the solve was interrupted"),
+    Reason.DIVERGED: (Status.DIVERGED, "no step decreases the cost"),
 }
 
 
-def unfinished(stop: Stop) -> tuple[Status, str]:
+def unfinished(why: Reason) -> tuple[Status, str]:
     """Status and reason for a method that ended before it found a stationary motion."""
-    return _UNFINISHED[stop]
+    return _UNFINISHED[why]
 
 
 def infeasible_sentence(reason: str) -> str:
@@ -75,7 +76,7 @@ def status_of(
     problem: TrajectoryProblem, outcome: Outcome[DiscretePath], n_neg: int
 ) -> tuple[Status, str]:
     """Status and message of an outcome."""
-    if outcome.stop is Stop.DIVERGED:
+    if outcome.why is Reason.DIVERGED:
         reason = non_finite_sentence(problem, outcome.x)
         if reason:
             return Status.DIVERGED, diverged(reason, outcome.iterations)
@@ -83,18 +84,18 @@ def status_of(
         f" A saddle of cost {cost:.10g} was left along negative curvature."
         for cost in outcome.saddles_left
     )
-    if outcome.stop is Stop.STATIONARY and n_neg == 0:
+    if outcome.why is Reason.STATIONARY and n_neg == 0:
         return (
             Status.MINIMUM,
             f"a minimum of cost {outcome.value:.10g} after {outcome.iterations} steps.{left}",
         )
-    if outcome.stop is Stop.STATIONARY:
+    if outcome.why is Reason.STATIONARY:
         return (
             Status.SADDLE,
             f"a saddle of cost {outcome.value:.10g} with {n_neg} directions of negative curvature; "
             "solve again with escape_saddles=True or another guess.",
         )
-    status, reason = unfinished(outcome.stop)
+    status, reason = unfinished(outcome.why)
     return status, (
         f"{reason} after {outcome.iterations} steps, before a minimum was found; the motion is the "
         f"best so far, of cost {outcome.value:.10g}.{left}"

@@ -14,8 +14,8 @@ from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import Grid
 from hovi.discrete.state import State
 from hovi.effects import Armature, Gravity
+from hovi.optimize.criteria import Criteria
 from hovi.optimize.interior_point import minimize_bounded
-from hovi.optimize.trust_region import Options
 from hovi.planning.problem.limits import as_limits, no_limits
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.bounded_action import BoundedAction
@@ -149,7 +149,7 @@ def test_within_limits_at_the_points_the_best_duration_is_that_of_a_scalar_searc
     two_link: hovi.Robot,
 ) -> None:
     limits = as_limits(two_link, TORQUES)
-    options = Options(decrease=1e-12)
+    options = Criteria(decrease=1e-12)
     problem = arm_problem(two_link, 1.0, "moving")
     rows = LimitRows(problem.grid, no_limits(two_link), None)
     objective = TimedBoundedAction(problem, limits, None, PRICE, rows)

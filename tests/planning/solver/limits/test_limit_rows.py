@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
+from hovi.optimize.criteria import Criteria
 from scipy.interpolate import BPoly, PPoly
 
 import hovi
@@ -15,7 +16,6 @@ from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import DiscretePath, Grid
 from hovi.discrete.state import State
 from hovi.optimize.interior_point import minimize_bounded
-from hovi.optimize.trust_region import Options
 from hovi.planning.problem.limits import Limits, as_limits
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.sequence.sequence_planner import plan_sequence
@@ -484,7 +484,7 @@ def test_solutions_lose_no_more_than_what_they_promise(two_link: hovi.Robot) -> 
     fine = LimitRows(grid, limits, None, None, (8, 8))
     objective = BoundedAction(problem, limits, rows=fine)
     start = guess_path(problem, found.trajectory)
-    exact = minimize_bounded(objective, start, Options(decrease=1e-10))
+    exact = minimize_bounded(objective, start, Criteria(decrease=1e-10))
     assert exact.feasible
     assert 0 < found.cost / exact.outputs.value - 1 < 2 * MAX_LOSS
     assert excess_by_sampling(problem, found.trajectory.path).max() <= 1e-8

@@ -9,10 +9,10 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 import pytest
+from hovi.optimize.criteria import Criteria
 
 import hovi
 from hovi.discrete.grid import DiscretePath
-from hovi.optimize.trust_region import Options
 from hovi.planning.clearance.convex_shapes import convex_geometry
 from hovi.planning.clearance.obstacles import Obstacle
 from hovi.planning.problem.limits import as_limits
@@ -97,7 +97,7 @@ def recorded(problem: TrajectoryProblem) -> tuple[list[set[str]], MethodResult]:
     """The obstacles of each solve of the interior point, and the result with all their steps."""
     given, steps = list[set[str]](), 0
 
-    def solve(part: TrajectoryProblem, path: DiscretePath, options: Options) -> MethodResult:
+    def solve(part: TrajectoryProblem, path: DiscretePath, options: Criteria) -> MethodResult:
         found = part.distances
         given.append(set() if found is None else {pair.other for pair in found.pairs})
         nonlocal steps
@@ -106,7 +106,7 @@ def recorded(problem: TrajectoryProblem) -> tuple[list[set[str]], MethodResult]:
         assert part_result.problem.finer.clearance is part.clearance
         return part_result
 
-    result = with_active_pairs(solve, problem, guess_path(problem, "cubic"), Options())
+    result = with_active_pairs(solve, problem, guess_path(problem, "cubic"), Criteria())
     assert result.nit == steps
     return given, result
 
@@ -159,13 +159,13 @@ def sampled(motion: hovi.Trajectory, count: int) -> Array:
 def test_the_end_of_the_time_before_the_check_is_reported(arm_scene: hovi.Scene) -> None:
     """The solve takes all of it."""
 
-    def solve(part: TrajectoryProblem, path: DiscretePath, options: Options) -> MethodResult:
-        result = InteriorPoint()._minimize(part, path, Options(), None)
+    def solve(part: TrajectoryProblem, path: DiscretePath, options: Criteria) -> MethodResult:
+        result = InteriorPoint()._minimize(part, path, Criteria(), None)
         time.sleep(options.time_limit or 0.0)
         return result
 
     problem = problem_of(arm_scene, [FAR])
-    options = Options(time_limit=0.3)
+    options = Criteria(time_limit=0.3)
     result = with_active_pairs(solve, problem, guess_path(problem, "cubic"), options)
     assert result.status is Status.TIME_LIMIT
     assert "before the distances along the motion were checked" in result.message
@@ -175,7 +175,7 @@ def test_the_end_of_the_time_before_the_check_is_reported(arm_scene: hovi.Scene)
 def test_without_time_for_the_first_check_the_solve_reports_it(arm_scene: hovi.Scene) -> None:
     problem = problem_of(arm_scene, [FAR])
     result = InteriorPoint().minimize(
-        problem, guess_path(problem, "cubic"), Options(time_limit=0.0)
+        problem, guess_path(problem, "cubic"), Criteria(time_limit=0.0)
     )
     assert result.status is Status.TIME_LIMIT
     assert result.problem.clearance is problem.clearance

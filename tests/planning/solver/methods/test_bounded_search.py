@@ -6,6 +6,8 @@ import dataclasses
 
 import numpy as np
 import pytest
+from hovi.optimize.criteria import Criteria
+from hovi.optimize.ended import Reason
 
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import Grid
@@ -13,7 +15,6 @@ from hovi.discrete.state import State
 from hovi.effects import Gravity
 from hovi.optimize.banded_model import BandModel
 from hovi.optimize.bordered_model import EquationModel
-from hovi.optimize.trust_region import Options, Stop
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.limits import as_limits
 from hovi.planning.problem.problem import TrajectoryProblem
@@ -75,9 +76,9 @@ def test_a_saddle_under_conditions_has_its_index() -> None:
     _, problem = reaches()
     assert problem.limits is not None
     path = guess_path(problem, "cubic")
-    search = BoundedSearch(problem, problem.limits, Options(max_iterations=200), None, path)
+    search = BoundedSearch(problem, problem.limits, Criteria(max_iterations=200), None, path)
     outcome = search.solve(path)
-    assert outcome.stop is Stop.STATIONARY
+    assert outcome.why is Reason.STATIONARY
     assert search.negative_eigenvalues(outcome) == 0
     model = outcome.model
     assert isinstance(model, EquationModel)

@@ -6,9 +6,9 @@ import dataclasses
 
 import numpy as np
 import pytest
+from hovi.optimize.criteria import Criteria
 
 import hovi
-from hovi.optimize.trust_region import Options
 from hovi.planning.clearance.clearance import Clearance
 from hovi.planning.problem.limits import as_limits
 from hovi.planning.problem.problem import TrajectoryProblem
@@ -73,7 +73,7 @@ def test_a_search_takes_over_the_multipliers_of_conditions(known: Solution) -> N
     fine = own.on(own.grid.halved())
     along = central.resampled(own, fine)
     assert fine.limits is not None
-    options = Options()
+    options = Criteria()
     guess = along.last
     search = BoundedSearch(fine, fine.limits, options, None, guess, along=along, lazy=True)
     _adopt(search, along)

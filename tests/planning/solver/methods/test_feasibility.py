@@ -7,12 +7,13 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 import pytest
+from hovi.optimize.criteria import Criteria
+from hovi.optimize.ended import Reason
 
 import hovi
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import Grid
 from hovi.optimize.bounded_objective import BoundedOutcome
-from hovi.optimize.trust_region import Options, Stop
 from hovi.planning.problem.limit_violation import excess_along
 from hovi.planning.problem.limits import as_limits
 from hovi.planning.problem.problem import TrajectoryProblem
@@ -33,9 +34,9 @@ def test_a_minimum_that_no_limit_touches_is_one_within_them(two_link: hovi.Robot
     free = solve_on_grid(TrajectoryProblem(ld, *ends))
     limits = as_limits(two_link, {"base": "none", "v": 40.0, "tau": 500.0})
     problem = TrajectoryProblem(ld, *ends, limits)
-    search = BoundedSearch(problem, limits, Options(), None, free.trajectory.path)
+    search = BoundedSearch(problem, limits, Criteria(), None, free.trajectory.path)
     found = unlimited_minimum(search, free.trajectory.path)
-    assert found.stop is Stop.STATIONARY
+    assert found.why is Reason.STATIONARY
     assert found.feasible
     assert found.outputs.value == free.cost
     assert search.negative_eigenvalues(found) == 0

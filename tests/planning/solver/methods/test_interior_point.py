@@ -6,6 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hovi.optimize.criteria import Criteria
+from hovi.optimize.ended import Reason
 
 import hovi
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
@@ -13,7 +15,6 @@ from hovi.discrete.grid import Grid
 from hovi.discrete.state import State
 from hovi.discrete.trajectory import Trajectory
 from hovi.optimize.interior_point import minimize_bounded
-from hovi.optimize.trust_region import Options, Stop
 from hovi.planning.problem.limits import Limits, as_limits
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.search.planner import plan
@@ -56,8 +57,8 @@ def test_at_the_points_the_least_cost_is_that_of_ipopt(
     problem = reach(models, name, limits)
     assert problem.limits is not None
     objective = BoundedAction(problem, problem.limits)
-    outcome = minimize_bounded(objective, guess_path(problem, "cubic"), Options())
-    assert outcome.stop is Stop.STATIONARY
+    outcome = minimize_bounded(objective, guess_path(problem, "cubic"), Criteria())
+    assert outcome.why is Reason.STATIONARY
     assert outcome.feasible
     assert outcome.iterations <= most_steps
     assert outcome.outputs.value <= known * (1 + 1e-7)
@@ -80,14 +81,14 @@ def test_limits_hold_at_ten_thousand_samples(models: Path, name: str) -> None:
         task.start,
         task.goal,
         task.duration,
-        scheme=task.options.scheme,
-        intervals=task.options.intervals,
-        limits=task.options.limits,
+        scheme=task.criteria.scheme,
+        intervals=task.criteria.intervals,
+        limits=task.criteria.limits,
         self_collision=False,
     )
     assert solution.status is Status.MINIMUM, solution.message
     assert solution.n_neg == 0
-    limits = as_limits(task.scene.robot, task.options.limits)
+    limits = as_limits(task.scene.robot, task.criteria.limits)
     assert largest_excess(solution.trajectory, limits) <= limits.tolerance
 
 

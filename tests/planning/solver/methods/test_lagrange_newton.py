@@ -9,9 +9,9 @@ import casadi as ca
 import numpy as np
 import pinocchio as pin
 import pytest
+from hovi.optimize.ended import Iteration
 
 import hovi
-from hovi.optimize.lagrange_newton import ConstrainedIteration
 from hovi.planning.solver.methods.augmented_lagrangian import AugmentedLagrangian
 from hovi.planning.solver.methods.lagrange_newton import LagrangeNewton
 from hovi.planning.solver.solver import solve_on_grid
@@ -127,7 +127,7 @@ def test_the_last_steps_converge_quadratically(scene: str, scheme: str) -> None:
     last = [step for step in swing_up(scene, scheme).history if step.decrease < 1e-3]
     assert len(last) >= 3
     for before, after in pairwise(last):
-        assert isinstance(after, ConstrainedIteration)
+        assert isinstance(after, Iteration)
         assert after.ratio == 1.0
         assert after.shift == 0.0
         assert np.log(after.decrease) < 1.3 * np.log(before.decrease) or after.decrease < 1e-11

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from hovi.optimize.criteria import Criteria
 
 from hovi.discrete.grid import DiscretePath
-from hovi.optimize.trust_region import Options
 from hovi.planning.problem.limits import as_limits
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.bounded_action import BoundedAction
@@ -148,7 +148,7 @@ def test_rows_of_parts_are_taken_with_their_intervals_and_values() -> None:
 def test_only_solves_on_a_central_path_begin_with_a_wide_trust_region() -> None:
     problem = problem_of("ur5")
     path, limits = wavy(problem), as_limits(problem.robot, LIMITS)
-    search = BoundedSearch(problem, limits, Options(max_iterations=1), None, path, lazy=True)
+    search = BoundedSearch(problem, limits, Criteria(max_iterations=1), None, path, lazy=True)
     search.solve(path)
     solved_from(search, path)
     search.solve_at_level(path, 1e-2)

@@ -7,7 +7,9 @@ import time
 import numpy as np
 
 from hovi.discrete.grid import DiscretePath
-from hovi.optimize.trust_region import Options, Outcome, Stop, minimize
+from hovi.optimize.criteria import Criteria
+from hovi.optimize.ended import Reason
+from hovi.optimize.trust_region import Outcome, minimize
 from hovi.planning.problem.contradictions import contradiction
 from hovi.planning.problem.limits import Limits
 from hovi.planning.problem.problem import TrajectoryProblem
@@ -65,7 +67,7 @@ def solve_jointly(
     """
     began = time.perf_counter()
     first, guess = _within(problem, path, price)
-    options = Options(
+    criteria = Criteria(
         decrease=STATIONARY_DECREASE,
         max_iterations=max_iterations,
         time_limit=time_limit,
@@ -75,9 +77,9 @@ def solve_jointly(
         barrier=barrier,
     )
     if problem.limited and problem.limits is not None:
-        result = _limited(first, problem.limits, guess, price, options)
+        result = _limited(first, problem.limits, guess, price, criteria)
     else:
-        result = _unlimited(first, guess, price, options)
+        result = _unlimited(first, guess, price, criteria)
     return solution_of(result, 0.0, time.perf_counter() - began)
 
 
@@ -94,16 +96,16 @@ def _within(
 
 
 def _unlimited(
-    problem: TrajectoryProblem, guess: DiscretePath, price: TimePrice, options: Options
+    problem: TrajectoryProblem, guess: DiscretePath, price: TimePrice, criteria: Criteria
 ) -> MethodResult:
     """By the trust region."""
     objective = TimedAction(problem, price)
-    outcome = minimize(objective, TimedPath(guess, problem.grid.duration), options)
+    outcome = minimize(objective, TimedPath(guess, problem.grid.duration), criteria)
     n_neg = 0 if outcome.convex else _negative_eigenvalues(objective, outcome)
     T, path = outcome.x.duration, outcome.x.path
     final = problem.on(problem.grid.stretched(T))
     cost = outcome.value - price.weight * T + price_of_time(final)
-    at_end = Outcome(path, cost, outcome.stop, outcome.iterations)
+    at_end = Outcome(path, cost, outcome.why, outcome.iterations)
     status, message = status_of(final, at_end, n_neg)
     message += chart_sentence(final, path)
     nit, history = outcome.iterations, outcome.history
@@ -115,7 +117,7 @@ def _limited(
     limits: Limits,
     guess: DiscretePath,
     price: TimePrice,
-    options: Options,
+    criteria: Criteria,
 ) -> MethodResult:
     """By the interior point, unless limits and ends contradict each other for all durations."""
     longest = problem.on(problem.grid.stretched(price.upper))
@@ -124,12 +126,12 @@ def _limited(
         message = f"no motion within the limits was found: {reason}."
         value = cost_of(problem, guess)
         return MethodResult(problem, guess, value, Status.INFEASIBLE, message)
-    return minimum_within_limits(problem, limits, guess, price, options)
+    return minimum_within_limits(problem, limits, guess, price, criteria)
 
 
 def _negative_eigenvalues(objective: TimedAction, outcome: Outcome[TimedPath]) -> int:
     """n_neg of the exact bordered Hessian; -1 if the value is not finite, or if time runs out."""
-    if outcome.stop is Stop.DIVERGED or not np.isfinite(outcome.value):
+    if outcome.why is Reason.DIVERGED or not np.isfinite(outcome.value):
         return -1
     try:
         model = objective.model(outcome.x, None, None)

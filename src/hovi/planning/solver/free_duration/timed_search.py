@@ -12,8 +12,9 @@ from hovi.discrete.grid import DiscretePath
 from hovi.optimize.barrier import Barrier
 from hovi.optimize.bordered_model import BorderedModel
 from hovi.optimize.bounded_objective import STOPPED, BoundedOutcome, Outputs
+from hovi.optimize.criteria import Criteria
+from hovi.optimize.ended import Reason
 from hovi.optimize.interior_point import minimize_bounded
-from hovi.optimize.trust_region import Options, Stop
 from hovi.planning.problem.limits import Limits
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.free_duration.timed_bounded_action import TimedBoundedAction
@@ -44,20 +45,20 @@ def minimum_within_limits(
     limits: Limits,
     guess: DiscretePath,
     price: TimePrice,
-    options: Options,
+    criteria: Criteria,
 ) -> MethodResult:
     """A motion and a duration of least S + w T within limits, from a guess for the problem's.
 
-    options.near: whether the guess nearly is a solution.
+    criteria.near: whether the guess nearly is a solution.
     """
-    search = TimedSearch(problem, limits, options, None, guess, price=price)
+    search = TimedSearch(problem, limits, criteria, None, guess, price=price)
     try:
         return _searched(search)
     except KeyboardInterrupt:  # between two solves, which handle their own
         record_interrupt()
-        return _ended(search, Stop.INTERRUPTED)
+        return _ended(search, Reason.INTERRUPTED)
     except OutOfTimeError:
-        return _ended(search, Stop.TIME_LIMIT)
+        return _ended(search, Reason.TIME_LIMIT)
 
 
 @dataclass(eq=False)
@@ -73,11 +74,11 @@ class TimedSearch(BoundedSearch):
     def solve(self, path: DiscretePath, start: Barrier | None = None) -> Bounded:
         """Solve with bounds at the quadrature points, from the problem's duration."""
         raise_if_late()
-        problem, options = self.problem, self.remaining_options()
-        options = dataclasses.replace(options, decrease=LAST_DECREASE)
+        problem, criteria = self.problem, self.remaining_criteria()
+        criteria = dataclasses.replace(criteria, decrease=LAST_DECREASE)
         objective = TimedBoundedAction(problem, self.limits, self.margins, self.price, self.rows)
         x = TimedPath(path, problem.grid.duration)
-        found = minimize_bounded(objective, x, options, self.report, start)
+        found = minimize_bounded(objective, x, criteria, self.report, start)
         self.iterations += found.iterations
         self.history += found.history
         self.rows = objective.rows
@@ -85,14 +86,14 @@ class TimedSearch(BoundedSearch):
         self.last = self.problem, found.x.path
         outcome = self._at_its_duration(found, objective)
         self.points = []  # these are of other durations
-        if outcome.stop is Stop.STATIONARY and outcome.marks:
+        if outcome.why is Reason.STATIONARY and outcome.marks:
             self._add_points(outcome, objective.at(found.x.duration))
         return outcome
 
     def solve_fixed(self, path: DiscretePath) -> Bounded:
         """Solve for the problem's duration, roughly."""
-        options = self.remaining_options()
-        rough = dataclasses.replace(options, decrease=ROUGH_DECREASE, barrier=ROUGH_BARRIER)
+        criteria = self.remaining_criteria()
+        rough = dataclasses.replace(criteria, decrease=ROUGH_DECREASE, barrier=ROUGH_BARRIER)
         return self.minimized(self.objective(None), path, rough, None)
 
     def back_to(self, problem: TrajectoryProblem) -> None:
@@ -128,7 +129,7 @@ class TimedSearch(BoundedSearch):
                 zu=share * barrier.zu,
                 mu=share * barrier.mu,
             ),
-            found.stop,
+            found.why,
             found.iterations,
             found.history,
             found.model,
@@ -138,7 +139,7 @@ class TimedSearch(BoundedSearch):
     def negative_eigenvalues(self, outcome: Bounded) -> int:
         """n_neg of the condensed system, the duration among its unknowns."""
         model = outcome.model
-        if outcome.stop is not Stop.STATIONARY or not isinstance(model, BorderedModel):
+        if outcome.why is not Reason.STATIONARY or not isinstance(model, BorderedModel):
             return -1
         return 0 if model.factor(0.0) is not None else model.negative_eigenvalues()
 
@@ -146,11 +147,11 @@ class TimedSearch(BoundedSearch):
 def _searched(search: TimedSearch) -> MethodResult:
     """A minimum at the points, then one within limits everywhere."""
     outcome = _at_the_points(search)
-    if outcome.stop in STOPPED or not usable(outcome):
-        return _ended(search, outcome.stop)
+    if outcome.why in STOPPED or not usable(outcome):
+        return _ended(search, outcome.why)
     outcome, reason, _ = tightened(search, outcome)
-    if not reason and outcome.stop is not Stop.STATIONARY:
-        return _ended(search, outcome.stop)
+    if not reason and outcome.why is not Reason.STATIONARY:
+        return _ended(search, outcome.why)
     problem, x, n_neg = search.problem, outcome.x, search.negative_eigenvalues(outcome)
     value, steps = cost_of(problem, x), search.iterations
     held = f"limits hold everywhere, on {problem.grid.intervals} intervals"
@@ -184,24 +185,24 @@ def _at_the_points(search: TimedSearch) -> Bounded:
     stretched or shrunk to a bound; a duration that is too short for one moves from the beginning.
     """
     path = search.guess
-    if not search.options.near:
+    if not search.criteria.near:
         fixed = search.solve_fixed(path)
-        if fixed.stop in STOPPED:
+        if fixed.why in STOPPED:
             return fixed
         if not fixed.feasible:
             return search.solve(path)
         path = fixed.x
     near = solved_from(search, path)
-    return near if usable(near) or near.stop in STOPPED else search.solve(search.guess)
+    return near if usable(near) or near.why in STOPPED else search.solve(search.guess)
 
 
-def _ended(search: TimedSearch, stop: Stop) -> MethodResult:
+def _ended(search: TimedSearch, why: Reason) -> MethodResult:
     """The motion of the last solve, which is no minimum."""
     problem, path = search.last
     value, steps = cost_of(problem, path), search.iterations
-    if stop is Stop.STATIONARY:
+    if why is Reason.STATIONARY:
         status, reason = Status.INFEASIBLE, "no motion within the limits was found"
     else:
-        status, reason = unfinished(stop)
+        status, reason = unfinished(why)
     message = f"{reason} after {steps} steps; the motion is the best so far, of cost {value:.10g}."
     return MethodResult(problem, path, value, status, message, steps, history=search.history)

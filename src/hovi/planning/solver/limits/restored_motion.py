@@ -13,7 +13,8 @@ from hovi.discrete.guess import stretched, with_bump
 from hovi.errors import ChartError
 from hovi.optimize.barrier import Barrier
 from hovi.optimize.bounded_objective import STOPPED, Outputs
-from hovi.optimize.trust_region import Stop, minimize
+from hovi.optimize.ended import Reason
+from hovi.optimize.trust_region import minimize
 from hovi.planning.solver.augmented_lagrangian_rounds import first_multipliers
 from hovi.planning.solver.bounded_action import BoundedAction
 from hovi.planning.solver.methods.bounded_search import Bounded, BoundedSearch
@@ -51,11 +52,11 @@ def locally_infeasible(search: BoundedSearch, outcome: Bounded) -> str:
     density = outcome.outputs.density(objective.bounds.measure)
     found: list[LeastViolation] = []
     for path in (outcome.x, search.guess, _bumped_guess(search, 0, BUMP_SHARE)):
-        each = least_violation(objective, path, density, search.remaining_options())
+        each = least_violation(objective, path, density, search.remaining_criteria())
         search.iterations += each.steps
         found.append(each)
-        if each.stop in STOPPED:
-            outcome.stop = each.stop
+        if each.why in STOPPED:
+            outcome.why = each.why
         if not each.least or each.violation <= SMALL_VIOLATION:
             break
     else:
@@ -81,16 +82,16 @@ def restored_motion(search: BoundedSearch, outcome: Bounded) -> tuple[Bounded, s
     least = np.inf
     bumped = (_bumped_guess(search, seed) for seed in range(BUMPED_GUESSES))
     for guess in chain([search.guess], bumped):
-        path, violation, stop = _penalized(search, objective, guess, density)
-        if stop in STOPPED:
-            outcome.stop = stop
+        path, violation, why = _penalized(search, objective, guess, density)
+        if why in STOPPED:
+            outcome.why = why
             return outcome, ""
         if violation <= SMALL_VIOLATION:
             search.multipliers, search.rows = None, search.coarse_rows()
             again = search.solve(path)
-            if again.feasible or again.stop in STOPPED:
+            if again.feasible or again.why in STOPPED:
                 return again, ""
-            if violation == 0.0 and stop is Stop.STATIONARY:
+            if violation == 0.0 and why is Reason.STATIONARY:
                 return unlimited_minimum(search, path), ""
         if violation < least:
             least, outcome.x = violation, path
@@ -101,7 +102,7 @@ def restored_motion(search: BoundedSearch, outcome: Bounded) -> tuple[Bounded, s
 def unlimited_minimum(search: BoundedSearch, path: DiscretePath) -> Bounded:
     """A minimum that no limit touches, which is one without limits as well."""
     objective, outputs, barrier = _without_forces(search, None, path)
-    found = Bounded(path, outputs, barrier, Stop.STATIONARY)
+    found = Bounded(path, outputs, barrier, Reason.STATIONARY)
     none = np.zeros_like(outputs.y)
     found.model = objective.model(path, none, none, none)
     return found
@@ -131,7 +132,7 @@ def _bumped_guess(search: BoundedSearch, seed: int, share: float = 1.0) -> Discr
 
 def _penalized(
     search: BoundedSearch, objective: BoundedAction, path: DiscretePath, density: float
-) -> tuple[DiscretePath, float, Stop]:
+) -> tuple[DiscretePath, float, Reason]:
     """A motion of small violation, by growing penalties; its violation, and why it stopped.
 
     A penalty that does not reduce the violation is the last.
@@ -139,11 +140,11 @@ def _penalized(
     violation = np.inf
     for penalty in PENALTIES:
         penalized = PenalizedAction(objective, penalty * density)
-        options = dataclasses.replace(search.remaining_options(), max_iterations=PENALTY_STEPS)
-        result = minimize(penalized, path, options, None)
+        criteria = dataclasses.replace(search.remaining_criteria(), max_iterations=PENALTY_STEPS)
+        result = minimize(penalized, path, criteria, None)
         path = result.x
         search.iterations += result.iterations
         before, violation = violation, penalized.violation(path)
-        if result.stop in STOPPED or violation > PENALTY_DECREASE * before:
+        if result.why in STOPPED or violation > PENALTY_DECREASE * before:
             break
-    return path, violation, result.stop
+    return path, violation, result.why

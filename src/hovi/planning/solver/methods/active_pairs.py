@@ -13,7 +13,8 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.discrete.grid import DiscretePath
-from hovi.optimize.trust_region import Options, Stop
+from hovi.optimize.criteria import Criteria
+from hovi.optimize.ended import Reason
 from hovi.planning.clearance.clearance import Clearance, PartOfClearance
 from hovi.planning.clearance.clearance_violation import near_pairs
 from hovi.planning.problem.contradictions import contradiction
@@ -26,7 +27,7 @@ from hovi.planning.solver.status import Status, unfinished
 from hovi.system.deadline import Deadline, OutOfTimeError
 from hovi.system.interruption import record_interrupt
 
-Solve = Callable[[TrajectoryProblem, DiscretePath, Options], MethodResult]
+Solve = Callable[[TrajectoryProblem, DiscretePath, Criteria], MethodResult]
 Index = npt.NDArray[np.intp]
 
 FIRST_BEYOND = 0.002
@@ -42,25 +43,25 @@ def with_active_pairs(
     solve: Solve,
     problem: TrajectoryProblem,
     path: DiscretePath,
-    options: Options,
+    criteria: Criteria,
     report: Report | None = None,
 ) -> MethodResult:
     """The result of solves with growing sets of pairs, until all pairs keep the margin.
 
-    solve: of a problem from a guess with options. The first set are the pairs that violate or touch
-    the margin along the guess; each solve begins at the last one's motion and on its grid.
+    solve: of a problem from a guess with criteria. The first set are the pairs that violate or
+    touch the margin along the guess; each solve begins at the last one's motion and on its grid.
     """
     limits = problem.limits or no_limits(problem.coordinates)
     if problem.distances is None or contradiction(problem, limits):
-        return solve(problem, path, options)
-    return _Rounds(solve, problem, options, report).run(path)
+        return solve(problem, path, criteria)
+    return _Rounds(solve, problem, criteria, report).run(path)
 
 
 def without_pairs(
     solve: Solve,
     problem: TrajectoryProblem,
     path: DiscretePath,
-    options: Options,
+    criteria: Criteria,
     report: Report | None = None,
 ) -> MethodResult | None:
     """The motion of a problem without limits that keeps its distances of itself; else None.
@@ -69,17 +70,17 @@ def without_pairs(
     """
     if problem.distances is None or contradiction(problem, no_limits(problem.coordinates)):
         return None
-    return _Rounds(solve, problem, options, report).free(path)
+    return _Rounds(solve, problem, criteria, report).free(path)
 
 
 class _Rounds:
     """The solves so far. nit, history: of all of them."""
 
     def __init__(
-        self, solve: Solve, problem: TrajectoryProblem, options: Options, report: Report | None
+        self, solve: Solve, problem: TrajectoryProblem, criteria: Criteria, report: Report | None
     ) -> None:
         self._solve, self._problem, self._report = solve, problem, report
-        self._options, self._deadline = options, Deadline(options.time_limit)
+        self._criteria, self._deadline = criteria, Deadline(criteria.time_limit)
 
     def run(self, path: DiscretePath) -> MethodResult:
         """Solve and add pairs until none is too close."""
@@ -87,18 +88,18 @@ class _Rounds:
             chosen = self._too_close(self._problem, path, FIRST_BEYOND)
         except KeyboardInterrupt:
             record_interrupt()  # which the solve sees
-            return self._solve(self._problem, path, self._options_left())
+            return self._solve(self._problem, path, self._criteria_left())
         except OutOfTimeError:
-            return self._solve(self._problem, path, self._options_left())
+            return self._solve(self._problem, path, self._criteria_left())
         result = self._solved(self._problem, path, chosen)
         while result.status in (Status.MINIMUM, Status.SADDLE):
             try:
                 more = self._violating(result, chosen)
             except KeyboardInterrupt:
                 record_interrupt()
-                return _unfinished(result, Stop.INTERRUPTED)
+                return _unfinished(result, Reason.INTERRUPTED)
             except OutOfTimeError:
-                return _unfinished(result, Stop.TIME_LIMIT)
+                return _unfinished(result, Reason.TIME_LIMIT)
             if len(more) == 0:
                 break
             free = len(chosen) == 0 and result.nit > 0
@@ -124,9 +125,9 @@ class _Rounds:
             return np.zeros(0, dtype=np.intp)
         return self._too_close(result.problem, result.path, ADDED_BEYOND)
 
-    def _options_left(self) -> Options:
-        """The options with the remaining time as time limit."""
-        return dataclasses.replace(self._options, time_limit=self._deadline.seconds_left)
+    def _criteria_left(self) -> Criteria:
+        """The criteria with the remaining time as time limit."""
+        return dataclasses.replace(self._criteria, time_limit=self._deadline.seconds_left)
 
     def _too_close(
         self, problem: TrajectoryProblem, path: DiscretePath, beyond: float = 0.0
@@ -157,12 +158,12 @@ class _Rounds:
         whole = problem.clearance
         assert whole is not None
         part = with_clearance(problem, PartOfClearance.of(whole, chosen.tolist()))
-        options = self._options_left()
+        criteria = self._criteria_left()
         if part.limited:
-            result = self._solve(part, path, options)
+            result = self._solve(part, path, criteria)
         else:
             method = next(method for method in WITHOUT_LIMITS if method.supports(part))
-            result = method.minimize(part, path, options, self._report)
+            result = method.minimize(part, path, criteria, self._report)
         return dataclasses.replace(result, problem=with_clearance(result.problem, whole))
 
 
@@ -174,9 +175,9 @@ def with_clearance(problem: TrajectoryProblem, clearance: Clearance) -> Trajecto
     return other
 
 
-def _unfinished(result: MethodResult, stop: Stop) -> MethodResult:
+def _unfinished(result: MethodResult, why: Reason) -> MethodResult:
     """A result whose distances were not checked to the end."""
-    status, reason = unfinished(stop)
+    status, reason = unfinished(why)
     message = (
         f"{reason} after {result.nit} steps, before the distances along the motion were checked; "
         f"the motion has the cost {result.cost:.10g}."

@@ -7,7 +7,9 @@ import dataclasses
 import numpy as np
 
 from hovi.discrete.grid import DiscretePath
-from hovi.optimize.trust_region import Iteration, Options, Outcome, minimize
+from hovi.optimize.criteria import Criteria
+from hovi.optimize.ended import Iteration
+from hovi.optimize.trust_region import Outcome, minimize
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.augmented_lagrangian_rounds import (
@@ -42,14 +44,14 @@ class AugmentedLagrangian(Method):
         self,
         problem: TrajectoryProblem,
         path: DiscretePath,
-        options: Options,
+        criteria: Criteria,
         report: Report | None = None,
     ) -> MethodResult:
         """See Method.minimize."""
         if problem.unreachable:
             value, message = cost_of(problem, path), f"{problem.unreachable}."
             return MethodResult(problem, path, value, Status.INFEASIBLE, message)
-        rounds, history = _rounds(problem, path, options, report)
+        rounds, history = _rounds(problem, path, criteria, report)
         outcome = rounds.result
         objective = ActionObjective(problem, multipliers=rounds.multipliers)
         n_neg = negative_eigenvalues(objective, outcome)
@@ -63,18 +65,18 @@ class AugmentedLagrangian(Method):
 
 
 def _rounds(
-    problem: TrajectoryProblem, path: DiscretePath, options: Options, report: Report | None
+    problem: TrajectoryProblem, path: DiscretePath, criteria: Criteria, report: Report | None
 ) -> tuple[ConstrainedResult[Outcome[DiscretePath]], list[Iteration]]:
     """Rounds until the constraints hold, and the history of all their steps."""
     history: list[Iteration] = []
-    deadline = Deadline(options.time_limit)
+    deadline = Deadline(criteria.time_limit)
 
     def minimize_round(
         known: Multipliers, x: DiscretePath, decrease: float
     ) -> Outcome[DiscretePath]:
         objective = ActionObjective(problem, multipliers=known)
-        tolerance, left = max(decrease, options.decrease), deadline.seconds_left
-        chosen = dataclasses.replace(options, decrease=tolerance, time_limit=left)
+        tolerance, left = max(decrease, criteria.decrease), deadline.seconds_left
+        chosen = dataclasses.replace(criteria, decrease=tolerance, time_limit=left)
         outcome = minimize(objective, x, chosen, with_offset(report, len(history)))
         history.extend(outcome.history)
         return outcome

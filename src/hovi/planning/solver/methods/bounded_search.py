@@ -14,10 +14,11 @@ from hovi.optimize.banded_model import BandModel
 from hovi.optimize.barrier import INITIAL_MARGIN, WARM_START_MARGIN, Barrier
 from hovi.optimize.bordered_model import EquationModel
 from hovi.optimize.bounded_objective import BoundedOutcome
+from hovi.optimize.criteria import Criteria
+from hovi.optimize.ended import Iteration, Reason
 from hovi.optimize.interior_point import minimize_bounded
 from hovi.optimize.merge_tree import MergeTreeModel
 from hovi.optimize.nearby_bounded import ROOM, follow_bounded
-from hovi.optimize.trust_region import Iteration, Options, Stop
 from hovi.planning.clearance.clearance import DISTANCE_SCALE
 from hovi.planning.clearance.clearance_violation import (
     approach_along,
@@ -88,7 +89,7 @@ class BoundedSearch:
     timed: ClassVar[bool] = False
     problem: TrajectoryProblem
     limits: Limits
-    options: Options
+    criteria: Criteria
     report: Report | None
     guess: DiscretePath
     iterations: int = 0
@@ -102,7 +103,7 @@ class BoundedSearch:
     locally_infeasible: bool = False
 
     def __post_init__(self) -> None:
-        self.deadline = Deadline(self.options.time_limit)
+        self.deadline = Deadline(self.criteria.time_limit)
         self.last = self.problem, self.guess
         self.history: list[Iteration] = []
         distances = self.problem.distances
@@ -147,7 +148,7 @@ class BoundedSearch:
         return self._rows(FINE_HALVINGS)
 
     def _rows(self, halvings: tuple[int, int]) -> LimitRows:
-        problem, limits, barrier = self.problem, self.limits, self.options.barrier
+        problem, limits, barrier = self.problem, self.limits, self.criteria.barrier
         ends = problem.free_ends, halvings, barrier, GivenEnds.of(problem)
         return LimitRows(problem.grid, limits, problem.coordinates.curved_space, *ends)
 
@@ -217,14 +218,14 @@ class BoundedSearch:
     def back_to(self, problem: TrajectoryProblem) -> None:
         """Continue from a motion of this problem: another one where the duration is free."""
 
-    def remaining_options(self) -> Options:
-        """The options with the remaining time as time limit."""
-        return dataclasses.replace(self.options, time_limit=self.deadline.seconds_left)
+    def remaining_criteria(self) -> Criteria:
+        """The criteria with the remaining time as time limit."""
+        return dataclasses.replace(self.criteria, time_limit=self.deadline.seconds_left)
 
     def solve(self, path: DiscretePath, start: Barrier | None = None) -> Bounded:
         """Solve with bounds at the quadrature points; in rounds for passive torques."""
         if not self.problem.constrained:
-            return self.minimized(self.objective(None), path, self.remaining_options(), start)
+            return self.minimized(self.objective(None), path, self.remaining_criteria(), start)
         if len(self.problem.passive) == 0:
             found = self._solved_under_conditions(path, start)
             if found is not None:
@@ -232,10 +233,10 @@ class BoundedSearch:
 
         def minimize_round(known: Multipliers, x: DiscretePath, decrease: float) -> Bounded:
             nonlocal start
-            objective, options = self.objective(known), self.remaining_options()
-            decrease, mu = max(decrease, options.decrease), max(ROUND_BARRIER, options.barrier)
-            options = dataclasses.replace(options, decrease=decrease, barrier=mu)
-            outcome = self.minimized(objective, x, options, start)
+            objective, criteria = self.objective(known), self.remaining_criteria()
+            decrease, mu = max(decrease, criteria.decrease), max(ROUND_BARRIER, criteria.barrier)
+            criteria = dataclasses.replace(criteria, decrease=decrease, barrier=mu)
+            outcome = self.minimized(objective, x, criteria, start)
             share = float(np.clip(decrease**0.5, ROUND_BARRIER, WARM_MU_RANGE[1]))
             mu = share * outcome.outputs.density(objective.bounds.measure)
             y, barrier = outcome.outputs.y, outcome.barrier
@@ -268,12 +269,12 @@ class BoundedSearch:
         """A solve whose steps meet the conditions at nodes; None where that fails."""
         known = self.multipliers or first_multipliers(self.problem, path)
         objective = self.objective(known, node_tolerance=NODE_TOLERANCE)
-        outcome = self.minimized(objective, path, self.remaining_options(), start)
+        outcome = self.minimized(objective, path, self.remaining_criteria(), start)
         met = objective.meets_equations(outcome.x)
-        if outcome.stop is Stop.DIVERGED or (outcome.stop is Stop.STATIONARY and not met):
+        if outcome.why is Reason.DIVERGED or (outcome.why is Reason.STATIONARY and not met):
             return None
         self.multipliers = objective.action.multipliers
-        spurious = outcome.stop is Stop.STATIONARY
+        spurious = outcome.why is Reason.STATIONARY
         self.unmet = spurious_sentence(self.problem, outcome.x) if spurious else ""
         return outcome
 
@@ -281,14 +282,14 @@ class BoundedSearch:
         self,
         objective: BoundedAction,
         path: DiscretePath,
-        options: Options,
+        criteria: Criteria,
         start: Barrier | None = None,
     ) -> Bounded:
         """One solve of an objective. start: see minimize_bounded."""
         raise_if_late()  # the outputs at the guess alone may take seconds
         if start is not None and len(start.s) != len(objective.bounds.lower):
             start = None  # rows were added in a solve that failed
-        outcome = minimize_bounded(objective, path, options, self.report, start, self.plain)
+        outcome = minimize_bounded(objective, path, criteria, self.report, start, self.plain)
         return self._noted(outcome, objective)
 
     def followed(
@@ -296,13 +297,13 @@ class BoundedSearch:
         objective: BoundedAction,
         path: DiscretePath,
         known: Barrier,
-        options: Options,
+        criteria: Criteria,
         most_outside: float = ROOM,
     ) -> Bounded:
         """A solve of an objective from the solution of a similar problem: see follow_bounded."""
         raise_if_late()
         known = dataclasses.replace(known, bounds=objective.bounds)
-        outcome = follow_bounded(objective, path, known, options, self.report, most_outside)
+        outcome = follow_bounded(objective, path, known, criteria, self.report, most_outside)
         return self._noted(outcome, objective)
 
     def _noted(self, outcome: Bounded, objective: BoundedAction) -> Bounded:
@@ -310,7 +311,7 @@ class BoundedSearch:
         self.iterations += outcome.iterations
         self.history += outcome.history
         self.last, self.solved = (self.problem, outcome.x), (outcome, objective)
-        if outcome.stop is Stop.STATIONARY and outcome.marks:
+        if outcome.why is Reason.STATIONARY and outcome.marks:
             self._add_points(outcome, objective)
         return outcome
 
@@ -348,7 +349,7 @@ class BoundedSearch:
 
     def negative_eigenvalues(self, outcome: Bounded) -> int:
         """n_neg of the condensed system, which is positive definite at a minimum."""
-        if outcome.stop is not Stop.STATIONARY or outcome.model is None:
+        if outcome.why is not Reason.STATIONARY or outcome.model is None:
             return -1
         if outcome.model.factor(0.0) is not None:
             return 0

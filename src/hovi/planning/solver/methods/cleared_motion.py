@@ -10,7 +10,7 @@ import numpy as np
 from hovi.discrete.grid import DiscretePath
 from hovi.optimize.barrier import Barrier
 from hovi.optimize.bounded_objective import STOPPED
-from hovi.optimize.trust_region import Stop
+from hovi.optimize.ended import Reason
 from hovi.planning.problem.limits import no_limits
 from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.augmented_lagrangian_rounds import (
@@ -67,7 +67,7 @@ def cleared_motion(search: BoundedSearch, guess: DiscretePath) -> Bounded:
     """
     assert search.near is not None
     free = _without_distances(search, guess)
-    if not search.near.blocked and free.stop is not Stop.DIVERGED:
+    if not search.near.blocked and free.why is not Reason.DIVERGED:
         return free
     by_legs = _by_legs(search, guess)
     if by_legs is not None:
@@ -80,10 +80,10 @@ def cleared_motion(search: BoundedSearch, guess: DiscretePath) -> Bounded:
         rough.append(_rough_with_distances(search, guess, min(steps, ROUGH_STEPS)))
     for found in sorted(filter(None, rough), key=lambda each: each.rank):
         outcome = found.solved(search)
-        if outcome.stop is not Stop.DIVERGED:
+        if outcome.why is not Reason.DIVERGED:
             return outcome
     raise_if_late()  # or more time might lead to one
-    return dataclasses.replace(free, stop=Stop.DIVERGED)
+    return dataclasses.replace(free, why=Reason.DIVERGED)
 
 
 def _by_legs(search: BoundedSearch, guess: DiscretePath) -> Bounded | None:
@@ -110,9 +110,9 @@ def _by_legs(search: BoundedSearch, guess: DiscretePath) -> Bounded | None:
 
 def _search_of(leg: Leg, search: BoundedSearch, guess: DiscretePath) -> BoundedSearch:
     """The search of a leg. guess: of the whole motion."""
-    problem, options = leg.problem, search.remaining_options()
+    problem, criteria = leg.problem, search.remaining_criteria()
     limits = problem.limits or no_limits(problem.coordinates)
-    return BoundedSearch(problem, limits, options, search.report, leg.path(guess), lazy=True)
+    return BoundedSearch(problem, limits, criteria, search.report, leg.path(guess), lazy=True)
 
 
 def _from_legs(
@@ -142,7 +142,7 @@ def _without_distances(search: BoundedSearch, guess: DiscretePath) -> Bounded:
     rough = _rough_with_constraints(search, guess)
     search.near = near
     near.extend(search.problem, rough.x, AHEAD)
-    return rough if near.blocked or rough.stop in STOPPED else search.solve(rough.x)
+    return rough if near.blocked or rough.why in STOPPED else search.solve(rough.x)
 
 
 def _rough_with_constraints(search: BoundedSearch, guess: DiscretePath) -> Bounded:
@@ -178,7 +178,7 @@ class _Rough:
         points = len(barrier.s) - len(self.near.order)
         search.rows, search.near = self.rows, near
         search.multipliers = self.multipliers
-        if self.outcome.stop in STOPPED:
+        if self.outcome.why in STOPPED:
             return search.solve(x)
         return search.solve(x, barrier.of(np.append(np.arange(points), points + kept)))
 
@@ -201,7 +201,7 @@ def _rough_with_distances(
     known = first_multipliers(problem, moved) if problem.constrained else None
     outcome, known = _rough(search, moved, known, FIRST_MU, most)
     violation = outcome.violation
-    if outcome.stop is Stop.DIVERGED or violation > ROUGH_VIOLATION:
+    if outcome.why is Reason.DIVERGED or violation > ROUGH_VIOLATION:
         return None
     if known is not None and len(problem.passive) > 0:
         residuals = ActionObjective(problem, multipliers=known).residuals(outcome.x)
@@ -221,8 +221,8 @@ def _rough(
     known: multipliers of constraints. mu: the first such parameter, None for a start at the guess.
     most: maximum number of steps.
     """
-    whole = search.remaining_options()
-    options = dataclasses.replace(
+    whole = search.remaining_criteria()
+    criteria = dataclasses.replace(
         whole,
         barrier=ROUGH_BARRIER,
         decrease=ROUGH_DECREASE,
@@ -234,4 +234,4 @@ def _rough(
         outputs = objective.outputs(path)
         density = outputs.density(objective.bounds.measure)
         start = Barrier.central(objective.bounds, outputs.y, mu * density)
-    return search.minimized(objective, path, options, start), objective.action.multipliers
+    return search.minimized(objective, path, criteria, start), objective.action.multipliers

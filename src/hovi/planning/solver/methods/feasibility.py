@@ -9,8 +9,10 @@ import numpy as np
 from hovi.discrete.grid import DiscretePath
 from hovi.optimize.barrier import Barrier
 from hovi.optimize.bounded_objective import STOPPED
+from hovi.optimize.criteria import Criteria
+from hovi.optimize.ended import Reason
 from hovi.optimize.nearby_bounded import ROOM
-from hovi.optimize.trust_region import Options, Stop, minimize
+from hovi.optimize.trust_region import minimize
 from hovi.planning.clearance.clearance_violation import approach_along
 from hovi.planning.problem.limits import no_limits
 from hovi.planning.problem.problem import TrajectoryProblem
@@ -60,16 +62,16 @@ def feasible_motion(search: BoundedSearch) -> tuple[Bounded, str]:
     moved = None if path is search.guess else path
     outcome = outcome or _solved_nearby(search, path) or _solved_at_all(search, moved)
     if search.near is not None:
-        failed = outcome.stop is Stop.DIVERGED and not outcome.feasible
+        failed = outcome.why is Reason.DIVERGED and not outcome.feasible
         return outcome, search.worst(outcome.x) if failed else ""
-    if outcome.stop is Stop.DIVERGED and not outcome.feasible:
+    if outcome.why is Reason.DIVERGED and not outcome.feasible:
         reason = locally_infeasible(search, outcome)
-        if reason or outcome.stop in STOPPED:
+        if reason or outcome.why in STOPPED:
             return outcome, reason
-    if outcome.stop is Stop.DIVERGED and outcome.corrected:
+    if outcome.why is Reason.DIVERGED and outcome.corrected:
         search.plain, search.rows = True, search.fine_rows()
         outcome = search.solve(_known(search, moved))
-    if outcome.feasible or outcome.stop is not Stop.DIVERGED:
+    if outcome.feasible or outcome.why is not Reason.DIVERGED:
         return outcome, ""
     return restored_motion(search, outcome)
 
@@ -77,27 +79,27 @@ def feasible_motion(search: BoundedSearch) -> tuple[Bounded, str]:
 def _solved_nearby(search: BoundedSearch, path: DiscretePath) -> Bounded | None:
     """The solution near a guess that is taken to be near one; None if it is not, or that fails."""
     constrained = search.problem.constrained and search.near is None
-    if not search.options.near or search.clearance is not None or constrained:
+    if not search.criteria.near or search.clearance is not None or constrained:
         return None
-    whole = search.options
+    whole = search.criteria
     most, along = whole.max_iterations, search.along
     if search.near is None:  # beyond, a solve from the guess is shorter
         most = min(WARM_STEPS, most)
-    search.options = dataclasses.replace(whole, max_iterations=most)
+    search.criteria = dataclasses.replace(whole, max_iterations=most)
     outcome = solved_from(search, path) if along is None else _solved_along(search, along)
     if along is not None and along.rows is None and not outcome.settled:
         search.rows, search.multipliers = search.coarse_rows(), None
         search.near = None if search.near is None else search.no_near_rows()
         outcome = solved_from(search, path)
-    search.options = whole
+    search.criteria = whole
     left = whole.max_iterations - outcome.iterations
-    closer = outcome.feasible and outcome.stop is Stop.ITERATION_LIMIT  # than a guess
+    closer = outcome.feasible and outcome.why is Reason.ITERATION_LIMIT  # than a guess
     if not closer or left <= 0:
         return outcome if outcome.settled else None
-    search.options = dataclasses.replace(whole, max_iterations=left)
+    search.criteria = dataclasses.replace(whole, max_iterations=left)
     outcome = search.solve(outcome.x, outcome.barrier)
-    search.options = whole
-    return None if outcome.stop is Stop.DIVERGED else outcome
+    search.criteria = whole
+    return None if outcome.why is Reason.DIVERGED else outcome
 
 
 def _known(search: BoundedSearch, moved: DiscretePath | None) -> DiscretePath:
@@ -155,10 +157,12 @@ def follow(problem: TrajectoryProblem, along: CentralPath, barrier: float) -> Ce
     barrier: last barrier parameter, relative to the mean density of the cost.
     """
     limits = problem.limits or no_limits(problem.coordinates)
-    search = BoundedSearch(problem, limits, Options(barrier=barrier), None, along.last, along=along)
+    search = BoundedSearch(
+        problem, limits, Criteria(barrier=barrier), None, along.last, along=along
+    )
     _adopt(search, along)
     outcome = _followed(search, along, COMPARED)
-    if outcome is None or outcome.stop is not Stop.STATIONARY:
+    if outcome is None or outcome.why is not Reason.STATIONARY:
         return None
     return search.central_path(outcome)
 
@@ -178,14 +182,14 @@ def _followed(
     y = objective.outputs(moved).y
     if len(y) != len(known.s) or np.max(np.abs(y - known.s), initial=0.0) > NEWTON_SHIFT:
         return None
-    options = dataclasses.replace(
-        search.remaining_options(),
-        barrier=max(search.options.barrier, WARM_BARRIER),
+    criteria = dataclasses.replace(
+        search.remaining_criteria(),
+        barrier=max(search.criteria.barrier, WARM_BARRIER),
         enough=enough[0],
-        max_iterations=min(NEWTON_STEPS, search.options.max_iterations),
+        max_iterations=min(NEWTON_STEPS, search.criteria.max_iterations),
     )
-    outcome = search.followed(objective, moved, known, options, enough[1])
-    if outcome.stop is Stop.STATIONARY or outcome.stop in STOPPED:
+    outcome = search.followed(objective, moved, known, criteria, enough[1])
+    if outcome.why is Reason.STATIONARY or outcome.why in STOPPED:
         return outcome
     _adopt(search, along)
     return None
@@ -197,8 +201,8 @@ def _solved_warm(search: BoundedSearch, known: Barrier, path: DiscretePath) -> B
     A few steps are enough, or there is another way; and they end where they change the cost by
     less than the barrier does.
     """
-    whole, mu = search.options, max(search.options.barrier, WARM_BARRIER)
-    search.options = dataclasses.replace(
+    whole, mu = search.criteria, max(search.criteria.barrier, WARM_BARRIER)
+    search.criteria = dataclasses.replace(
         whole,
         barrier=mu,
         enough=WARM_DECREASE,
@@ -211,7 +215,7 @@ def _solved_warm(search: BoundedSearch, known: Barrier, path: DiscretePath) -> B
         mu *= outputs.density(objective.bounds.measure)
         start = known.warm(objective.bounds, outputs.y, mu, WARM_MARGIN)
     outcome = search.solve(path, start)
-    search.options = whole
+    search.criteria = whole
     return outcome
 
 
@@ -253,20 +257,20 @@ def _moved_out_of_obstacles(
 
     In one stage a motion deep in an obstacle would leave it on different sides at different times.
     """
-    options, search.clearance = search.options, None
+    criteria, search.clearance = search.criteria, None
     path = _without_obstacles(search, path)
     approach = approach_along(search.problem.trajectory(path), wanted.distances, wanted.least)
     depth = wanted.least - float(approach.distance.min())
     stages = int(np.clip(np.ceil(depth / STAGE_DEPTH), 1, MAX_STAGES))
-    search.options = dataclasses.replace(options, max_iterations=STAGE_STEPS)
+    search.criteria = dataclasses.replace(criteria, max_iterations=STAGE_STEPS)
     for share in np.arange(1, stages) / stages:
         least = wanted.least - (1.0 - share) * depth
         search.clearance = ClearanceOutputs(wanted.distances, least)
         outcome = search.solve(path)
         path = outcome.x
-        if outcome.stop in STOPPED:
+        if outcome.why in STOPPED:
             break
-    search.options, search.clearance = options, wanted
+    search.criteria, search.clearance = criteria, wanted
     return path
 
 
@@ -277,7 +281,7 @@ def _without_obstacles(search: BoundedSearch, path: DiscretePath) -> DiscretePat
         return outcome.x if outcome.feasible else path
     if search.problem.constrained:
         return path
-    objective, options = ActionObjective(search.problem), search.remaining_options()
-    result = minimize(objective, path, options, search.report)
+    objective, criteria = ActionObjective(search.problem), search.remaining_criteria()
+    result = minimize(objective, path, criteria, search.report)
     search.iterations += result.iterations
     return result.x if np.isfinite(result.value) else path

@@ -10,7 +10,8 @@ import numpy as np
 
 from hovi.discrete.grid import DiscretePath
 from hovi.optimize.bounded_objective import STOPPED
-from hovi.optimize.trust_region import Options, Stop
+from hovi.optimize.criteria import Criteria
+from hovi.optimize.ended import Reason
 from hovi.planning.problem.contradictions import contradiction
 from hovi.planning.problem.limits import no_limits
 from hovi.planning.problem.problem import TrajectoryProblem
@@ -77,37 +78,37 @@ class InteriorPoint(Method):
         self,
         problem: TrajectoryProblem,
         path: DiscretePath,
-        options: Options,
+        criteria: Criteria,
         report: Report | None = None,
     ) -> MethodResult:
         """See Method.minimize; the guess may violate the limits, and intervals may be split."""
         solve = partial(self._solved, report=report)
-        return with_torque_rates_last(solve, problem, path, options)
+        return with_torque_rates_last(solve, problem, path, criteria)
 
     def _solved(
         self,
         problem: TrajectoryProblem,
         path: DiscretePath,
-        options: Options,
+        criteria: Criteria,
         report: Report | None,
     ) -> MethodResult:
         """With rows for distances where pairs come near; in rounds where that is not supported."""
         rounds = partial(with_active_pairs, partial(self._minimize, report=report), report=report)
         if not takes_rows(problem):
-            return rounds(problem, path, options)
-        most = min(STEPS_AT_POINTS, options.max_iterations)
-        at_points = dataclasses.replace(options, max_iterations=most)
+            return rounds(problem, path, criteria)
+        most = min(STEPS_AT_POINTS, criteria.max_iterations)
+        at_points = dataclasses.replace(criteria, max_iterations=most)
         if self.distances == "points":
             return rounds(problem, path, at_points)
-        deadline = Deadline(options.time_limit)
+        deadline = Deadline(criteria.time_limit)
         if not problem.has_limits:
             free = without_pairs(
-                partial(self._minimize, report=report), problem, path, options, report
+                partial(self._minimize, report=report), problem, path, criteria, report
             )
             if free is not None:
                 return free
-            options = dataclasses.replace(options, time_limit=deadline.seconds_left)
-        found = self._minimize(problem, path, options, report, lazy=True)
+            criteria = dataclasses.replace(criteria, time_limit=deadline.seconds_left)
+        found = self._minimize(problem, path, criteria, report, lazy=True)
         if self.distances == "rows" or found.status not in WITHOUT_MOTION:
             return found
         at_points = dataclasses.replace(at_points, time_limit=deadline.seconds_left)
@@ -119,7 +120,7 @@ class InteriorPoint(Method):
         self,
         problem: TrajectoryProblem,
         path: DiscretePath,
-        options: Options,
+        criteria: Criteria,
         report: Report | None,
         lazy: bool = False,
     ) -> MethodResult:
@@ -132,15 +133,15 @@ class InteriorPoint(Method):
             )
         along, level = self.along, self.level
         search = BoundedSearch(
-            problem, limits, options, report, path, along=along, level=level, lazy=lazy
+            problem, limits, criteria, report, path, along=along, level=level, lazy=lazy
         )
         try:
             return _searched(search)
         except KeyboardInterrupt:  # between two solves, which handle their own
             record_interrupt()
-            return _ended(search, Stop.INTERRUPTED)
+            return _ended(search, Reason.INTERRUPTED)
         except OutOfTimeError:
-            return _ended(search, Stop.TIME_LIMIT)
+            return _ended(search, Reason.TIME_LIMIT)
 
 
 def _searched(search: BoundedSearch) -> MethodResult:
@@ -150,23 +151,23 @@ def _searched(search: BoundedSearch) -> MethodResult:
     if not reason and usable(outcome) and not search.rows.fixed:
         outcome, reason, excess = tightened(search, outcome)
         reason = reason or search.unmet
-        if not reason and outcome.stop is Stop.STATIONARY:  # others may just lack rows yet
+        if not reason and outcome.why is Reason.STATIONARY:  # others may just lack rows yet
             reason = search.too_close(outcome.x)
     problem, x, n_neg = search.problem, outcome.x, search.negative_eigenvalues(outcome)
     value, nit = cost_of(problem, x), search.iterations
-    broken = "" if outcome.stop in STOPPED else _non_finite(search, x, value, excess)
+    broken = "" if outcome.why in STOPPED else _non_finite(search, x, value, excess)
     if broken:  # by an effect, not by the limits
         status, message = Status.DIVERGED, diverged(broken, nit)
     elif reason:
         status, message = Status.INFEASIBLE, infeasible_sentence(reason)
-    elif outcome.stop is not Stop.STATIONARY:
-        status, message = _unfinished(outcome.stop, nit, value)
+    elif outcome.why is not Reason.STATIONARY:
+        status, message = _unfinished(outcome.why, nit, value)
     elif n_neg == 0:
         status, message = Status.MINIMUM, _minimum(search, value, excess)
     else:
         status, message = Status.SADDLE, _saddle(value, n_neg)
     instants, forces = None, None
-    if outcome.stop not in (Stop.TIME_LIMIT, Stop.DIVERGED):  # or rows may be of a later attempt
+    if outcome.why not in (Reason.TIME_LIMIT, Reason.DIVERGED):  # or rows may be of a later attempt
         instants, forces = search.forces(outcome)
     history, central = search.history, None
     if status is Status.MINIMUM:
@@ -176,11 +177,11 @@ def _searched(search: BoundedSearch) -> MethodResult:
     return dataclasses.replace(result, central=central, locally_infeasible=locally)
 
 
-def _ended(search: BoundedSearch, stop: Stop) -> MethodResult:
+def _ended(search: BoundedSearch, why: Reason) -> MethodResult:
     """The motion of the last solve."""
     problem, path = search.last
     value, nit = cost_of(problem, path), search.iterations
-    status, message = _unfinished(stop, nit, value)
+    status, message = _unfinished(why, nit, value)
     return MethodResult(problem, path, value, status, message, nit, history=search.history)
 
 
@@ -195,8 +196,8 @@ def _non_finite(search: BoundedSearch, path: DiscretePath, cost: float, excess: 
     return at_points or f"{search.worst(path)}, between the quadrature points"
 
 
-def _unfinished(stop: Stop, nit: int, cost: float) -> tuple[Status, str]:
-    status, reason = unfinished(stop)
+def _unfinished(why: Reason, nit: int, cost: float) -> tuple[Status, str]:
+    status, reason = unfinished(why)
     return status, (
         f"{reason} after {nit} steps, before a minimum within the limits was found; the motion is "
         f"the best so far, of cost {cost:.10g}."

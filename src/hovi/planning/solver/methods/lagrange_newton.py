@@ -9,8 +9,10 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.discrete.grid import DiscretePath
+from hovi.optimize.criteria import Criteria
+from hovi.optimize.ended import Iteration, Reason
 from hovi.optimize.lagrange_newton import ConstrainedOutcome, minimize_under_equations
-from hovi.optimize.trust_region import Iteration, Options, Outcome, Stop, minimize
+from hovi.optimize.trust_region import Outcome, minimize
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.augmented_lagrangian_rounds import (
@@ -58,14 +60,14 @@ class LagrangeNewton(Method):
         self,
         problem: TrajectoryProblem,
         path: DiscretePath,
-        options: Options,
+        criteria: Criteria,
         report: Report | None = None,
     ) -> MethodResult:
         """See Method.minimize."""
         rounds = AugmentedLagrangian()
         if problem.unreachable:
-            return rounds.minimize(problem, path, options, report)
-        search = _Search(problem, options, report)
+            return rounds.minimize(problem, path, criteria, report)
+        search = _Search(problem, criteria, report)
         found = search.run(path)
         if found is not None:
             return found
@@ -81,17 +83,17 @@ class _Search:
     """A search from a guess, and the history of its steps."""
 
     problem: TrajectoryProblem
-    options: Options
+    criteria: Criteria
     on_step: Report | None
     history: list[Iteration] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        self.deadline = Deadline(self.options.time_limit)
+        self.deadline = Deadline(self.criteria.time_limit)
 
     @property
-    def left(self) -> Options:
-        """The options with the time that is left."""
-        return dataclasses.replace(self.options, time_limit=self.deadline.seconds_left)
+    def left(self) -> Criteria:
+        """The criteria with the time that is left."""
+        return dataclasses.replace(self.criteria, time_limit=self.deadline.seconds_left)
 
     @property
     def report(self) -> Report | None:
@@ -104,19 +106,19 @@ class _Search:
         multipliers = None
         saddles: list[float] = []
         objective = ConstrainedAction(problem, path)
-        if self.options.near or len(problem.passive) > 0:
+        if self.criteria.near or len(problem.passive) > 0:
             multipliers = self._known(path, objective)
         if multipliers is None and len(problem.passive) == 0:
             first, multipliers = self._first_round(path, objective)
             path, saddles = first.x, first.saddles_left
-            if first.stop is not Stop.STATIONARY:
-                return None if first.stop is Stop.DIVERGED else self._result(objective, first, -1)
+            if first.why is not Reason.STATIONARY:
+                return None if first.why is Reason.DIVERGED else self._result(objective, first, -1)
         found = minimize_under_equations(
             objective, path, objective.penalty, self.left, multipliers, self.report
         )
         self.history += found.history
         found.saddles_left = saddles + found.saddles_left
-        if found.stop is Stop.DIVERGED and not found.stuck:
+        if found.why is Reason.DIVERGED and not found.stuck:
             return None
         return self._result(objective, found, _negative_eigenvalues(objective, found))
 
@@ -147,8 +149,8 @@ class _Search:
             first_multipliers(self.problem, path), node_penalty=objective.node_penalty
         )
         penalized = ActionObjective(self.problem, multipliers=known)
-        options = dataclasses.replace(self.left, decrease=FIRST_DECREASE)
-        outcome = minimize(penalized, path, options, self.report)
+        criteria = dataclasses.replace(self.left, decrease=FIRST_DECREASE)
+        outcome = minimize(penalized, path, criteria, self.report)
         self.history += outcome.history
         updated = known.updated(penalized.residuals(outcome.x), self.problem.passive)
         return outcome, objective.of_nodes(updated)
@@ -168,7 +170,7 @@ class _Search:
             found.value = problem.ld.action(x)
         found.value += price_of_time(problem)
         met = within(residuals, FEASIBLE_RESIDUAL, FEASIBLE_RESIDUAL)
-        ended = found.stop is Stop.STATIONARY or (found.stop is Stop.ITERATION_LIMIT and met)
+        ended = found.why is Reason.STATIONARY or (found.why is Reason.ITERATION_LIMIT and met)
         reason = spurious_sentence(problem, x) if ended else ""
         if isinstance(found, ConstrainedOutcome) and found.stuck:
             reason = unmet_sentence(problem, x, residuals)

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from hovi.discrete.guess import stretched
 from hovi.optimize.bounded_objective import STOPPED
-from hovi.optimize.trust_region import Stop
+from hovi.optimize.ended import Reason
 from hovi.planning.solver.methods.bounded_search import (
     WARM_MU_RANGE,
     Bounded,
@@ -66,7 +66,7 @@ def tightened(search: BoundedSearch, outcome: Bounded) -> tuple[Bounded, str, fl
         problem = search.problem
         coarse = excess > HALVING_EXCESS or (finer and on_grid > MAX_ROUNDS_PER_GRID)
         again = None if coarse else _solved_tighter(search, outcome, sides)
-        failed = again is None or not (_goes_on(search, again) or again.stop in STOPPED)
+        failed = again is None or not (_goes_on(search, again) or again.why in STOPPED)
         if failed and finer:
             halvings, on_grid = halvings + 1, 0
             search.back_to(problem)
@@ -76,7 +76,7 @@ def tightened(search: BoundedSearch, outcome: Bounded) -> tuple[Bounded, str, fl
         outcome = again
         if not usable(again):
             break
-    if not reason and excess > tolerance and outcome.stop in (Stop.STATIONARY, Stop.DIVERGED):
+    if not reason and excess > tolerance and outcome.why in (Reason.STATIONARY, Reason.DIVERGED):
         reason = (
             f"{search.worst(outcome.x)}, between the quadrature points, at which limits are "
             "imposed; use more intervals"
@@ -86,12 +86,12 @@ def tightened(search: BoundedSearch, outcome: Bounded) -> tuple[Bounded, str, fl
 
 def usable(outcome: Bounded) -> bool:
     """Whether the motion is within bounds at the points, even if not a minimum yet."""
-    return outcome.feasible and outcome.stop in (Stop.STATIONARY, Stop.ITERATION_LIMIT)
+    return outcome.feasible and outcome.why in (Reason.STATIONARY, Reason.ITERATION_LIMIT)
 
 
 def _goes_on(search: BoundedSearch, outcome: Bounded) -> bool:
     """Whether bounds may be tightened further; with a free duration, after a minimum alone."""
-    return usable(outcome) and not (search.timed and outcome.stop is Stop.ITERATION_LIMIT)
+    return usable(outcome) and not (search.timed and outcome.why is Reason.ITERATION_LIMIT)
 
 
 def _solved_tighter(search: BoundedSearch, outcome: Bounded, sides: Array) -> Bounded:
@@ -107,12 +107,12 @@ def _solved_tighter(search: BoundedSearch, outcome: Bounded, sides: Array) -> Bo
     mu = share * outcome.outputs.density(objective.bounds.measure)
     y, barrier = objective.outputs(outcome.x).y, outcome.barrier
     start = barrier.warm(objective.bounds, y, mu) if len(y) == len(barrier.s) else None
-    whole = search.options
+    whole = search.criteria
     if search.timed:
         most = min(TIMED_STEPS, whole.max_iterations)
-        search.options = dataclasses.replace(whole, max_iterations=most)
+        search.criteria = dataclasses.replace(whole, max_iterations=most)
     outcome = search.solve(outcome.x, start)
-    search.options = whole
+    search.criteria = whole
     return outcome
 
 
@@ -154,6 +154,6 @@ def _solved_on_halves(search: BoundedSearch, outcome: Bounded, sides: Array) -> 
         search.near = search.no_near_rows()
     if usable(outcome) and by_interval.max() <= WARM_EXCESS:
         again = solved_from(search, search.problem.path(motion))
-        if usable(again) or again.stop in STOPPED:
+        if usable(again) or again.why in STOPPED:
             return again, ""
     return feasible_motion(search)

@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING
 from hovi.discrete.grid import DiscretePath
 from hovi.discrete.instants import Instants
 from hovi.discrete.interval_batch import Jet
+from hovi.optimize.criteria import Criteria
+from hovi.optimize.ended import Iteration
 from hovi.optimize.quadratic_model import QuadraticModel
-from hovi.optimize.trust_region import Iteration, Options
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.status import Status
 from hovi.scene.lagrangian import PointTerms
@@ -70,12 +71,12 @@ class Method(ABC):
         self,
         problem: TrajectoryProblem,
         path: DiscretePath,
-        options: Options,
+        criteria: Criteria,
         report: Report | None = None,
     ) -> MethodResult:
         """A motion of least action, from a guess.
 
         path: the guess, on the problem's grid and with its boundary data.
-        options: tolerances, and limits on steps and time. report: see Report.
+        criteria: tolerances, and limits on steps and time. report: see Report.
         A KeyboardInterrupt during the iterations ends the method with the best motion so far.
         """

@@ -9,7 +9,8 @@ import numpy.typing as npt
 
 from hovi.discrete.grid import DiscretePath
 from hovi.optimize.banded_model import BandModel
-from hovi.optimize.trust_region import Options, Stop
+from hovi.optimize.criteria import Criteria
+from hovi.optimize.ended import Reason
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.methods.method import Method, MethodResult, Report
@@ -51,22 +52,22 @@ class Stationary(Method):
         self,
         problem: TrajectoryProblem,
         path: DiscretePath,
-        options: Options,
+        criteria: Criteria,
         report: Report | None = None,
     ) -> MethodResult:
         """See Method.minimize; what is made small is the gradient."""
         search = _Search(ActionObjective(problem, "band"), path)
-        with Deadline(options.time_limit).in_force():
-            stop = search.run(options.max_iterations, report)
+        with Deadline(criteria.time_limit).in_force():
+            why = search.run(criteria.max_iterations, report)
         x, value = search.x, cost_of(problem, search.x)
-        n_neg = search.objective.negative_eigenvalues(x) if stop is Stop.STATIONARY else -1
-        if stop is Stop.STATIONARY:
+        n_neg = search.objective.negative_eigenvalues(x) if why is Reason.STATIONARY else -1
+        if why is Reason.STATIONARY:
             status, steps = Status.STATIONARY, search.steps
             message = f"a stationary point of cost {value:.10g} and index {n_neg} after {steps} "
             message += f"steps.{chart_sentence(problem, x)}"
         else:
-            status, reason = unfinished(stop)
-            if stop is Stop.DIVERGED:
+            status, reason = unfinished(why)
+            if why is Reason.DIVERGED:
                 reason = "no step makes the gradient smaller"
             message = (
                 f"{reason} after {search.steps} steps, before a stationary point was found; try a "
@@ -86,24 +87,24 @@ class _Search:
         floor = METRIC_FLOOR * max(abs(D).max(), 1e-300)
         self.metric = _factor(D, floor)
 
-    def run(self, most: int, report: Report | None) -> Stop:
+    def run(self, most: int, report: Report | None) -> Reason:
         """Take steps until the gradient is one of rounding errors; why it stopped."""
         try:
             for _ in range(most):
                 raise_if_late()
-                stop = self._step()
-                if stop is not None:
-                    return stop
+                why = self._step()
+                if why is not None:
+                    return why
                 if report is not None:
                     report(self.steps, self.objective.problem.ld.action(self.x))
         except KeyboardInterrupt:
             record_interrupt()
-            return Stop.INTERRUPTED
+            return Reason.INTERRUPTED
         except OutOfTimeError:
-            return Stop.TIME_LIMIT
-        return Stop.ITERATION_LIMIT
+            return Reason.TIME_LIMIT
+        return Reason.ITERATION_LIMIT
 
-    def _step(self) -> Stop | None:
+    def _step(self) -> Reason | None:
         """One Newton step, shortened until the gradient decreases; why no further one is taken."""
         model = self.objective.model(self.x, None, None)
         assert isinstance(model, BandModel)
@@ -112,20 +113,20 @@ class _Search:
         try:
             step = _factor(H).solve(-gradient)
         except RuntimeError:  # exactly singular
-            return Stop.DIVERGED
+            return Reason.DIVERGED
         length = self.objective.relative_size(self.x, step, model)
         if not np.isfinite(length):
-            return Stop.DIVERGED
+            return Reason.DIVERGED
         size, share = self._norm(gradient), 1.0
         while share >= LEAST_SHARE:
             trial = self.objective.retract(self.x, share * step, model)
             if self._norm(self._gradient(trial, model)) <= (1.0 - DECREASE * share) * size:
                 self.x, self.steps = trial, self.steps + 1
-                return Stop.STATIONARY if share * length <= ROUNDING_LENGTH else None
+                return Reason.STATIONARY if share * length <= ROUNDING_LENGTH else None
             if length <= CONVERGED_LENGTH:
-                return Stop.STATIONARY
+                return Reason.STATIONARY
             share /= 2
-        return Stop.DIVERGED
+        return Reason.DIVERGED
 
     def _gradient(self, x: DiscretePath, model: BandModel) -> Array:
         if not np.isfinite(self.objective.value(x)):

@@ -12,7 +12,7 @@ import numpy as np
 
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import DiscretePath
-from hovi.optimize.trust_region import Options
+from hovi.optimize.criteria import Criteria
 from hovi.planning.problem.limit_violation import closeness
 from hovi.planning.problem.limits import KINDS, Limits
 from hovi.planning.problem.problem import TrajectoryProblem
@@ -22,7 +22,7 @@ from hovi.scene.jerk_lagrangian import JerkLagrangian
 from hovi.scene.lagrangian import PointTerms
 from hovi.system.deadline import Deadline
 
-Solve = Callable[[TrajectoryProblem, DiscretePath, Options], MethodResult]
+Solve = Callable[[TrajectoryProblem, DiscretePath, Criteria], MethodResult]
 TORQUE_RATE = "torque_rate"
 NEAR_A_RATE = 0.02
 """Distance of a guess from the limits on the torque rate, as a share of their range, below which
@@ -30,29 +30,29 @@ they are imposed at once where the guess is the motion of a similar problem."""
 
 
 def with_torque_rates_last(
-    solve: Solve, problem: TrajectoryProblem, path: DiscretePath, options: Options
+    solve: Solve, problem: TrajectoryProblem, path: DiscretePath, criteria: Criteria
 ) -> MethodResult:
     """The result of a solve without limits on the torque rate; with them if the motion needs them.
 
-    solve: of a problem from a guess with options. The second solve begins at the first one's motion
-    and on its grid. There is only one if the guess is the motion of a similar problem and near such
-    a limit.
+    solve: of a problem from a guess with criteria. The second solve begins at the first one's
+    motion and on its grid. There is only one if the guess is the motion of a similar problem and
+    near such a limit.
     """
     limits, lagrangian = problem.limits, problem.ld.lagrangian
     if limits is None or not isinstance(lagrangian, JerkLagrangian) or not lagrangian.torque_rates:
-        return solve(problem, path, options)
-    if options.near and _margin(problem, limits, path) < NEAR_A_RATE:
-        return solve(problem, path, options)
-    deadline = Deadline(options.time_limit)
+        return solve(problem, path, criteria)
+    if criteria.near and _margin(problem, limits, path) < NEAR_A_RATE:
+        return solve(problem, path, criteria)
+    deadline = Deadline(criteria.time_limit)
     without = dataclasses.replace(lagrangian, torque_rates=False)
     ld = DiscreteLagrangian(without, problem.grid)
     loose = dataclasses.replace(problem, ld=ld, limits=limits.without(TORQUE_RATE))
     if not loose.limited:
-        return solve(problem, path, options)
-    first = solve(loose, path, options)
+        return solve(problem, path, criteria)
+    first = solve(loose, path, criteria)
     full = problem.on(first.problem.grid)
     if first.status is Status.MINIMUM and _margin(full, limits, first.path) < -limits.tolerance:
-        left = dataclasses.replace(options, time_limit=deadline.seconds_left, near=True)
+        left = dataclasses.replace(criteria, time_limit=deadline.seconds_left, near=True)
         second = solve(full, first.path, left)
         return dataclasses.replace(
             second, nit=first.nit + second.nit, history=[*first.history, *second.history]

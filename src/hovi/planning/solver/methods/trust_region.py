@@ -7,7 +7,9 @@ import dataclasses
 import numpy as np
 
 from hovi.discrete.grid import DiscretePath
-from hovi.optimize.trust_region import Options, Outcome, Stop, minimize
+from hovi.optimize.criteria import Criteria
+from hovi.optimize.ended import Reason
+from hovi.optimize.trust_region import Outcome, minimize
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.methods.method import Method, MethodResult, Report
@@ -27,12 +29,12 @@ class TrustRegion(Method):
         self,
         problem: TrajectoryProblem,
         path: DiscretePath,
-        options: Options,
+        criteria: Criteria,
         report: Report | None = None,
     ) -> MethodResult:
         """See Method.minimize."""
         objective = ActionObjective(problem)
-        outcome = minimize(objective, path, dataclasses.replace(options, exact=True), report)
+        outcome = minimize(objective, path, dataclasses.replace(criteria, exact=True), report)
         n_neg = 0 if outcome.convex else negative_eigenvalues(objective, outcome)
         outcome.value += price_of_time(problem)
         status, message = status_of(problem, outcome, n_neg)
@@ -52,7 +54,7 @@ class TrustRegion(Method):
 
 def negative_eigenvalues(objective: ActionObjective, outcome: Outcome[DiscretePath]) -> int:
     """n_neg of the exact Hessian; -1 if the value is not finite, or if time runs out."""
-    if outcome.stop is Stop.DIVERGED or not np.isfinite(outcome.value):
+    if outcome.why is Reason.DIVERGED or not np.isfinite(outcome.value):
         return -1
     try:
         definite = objective.model(outcome.x, None, None).factor(0.0) is not None

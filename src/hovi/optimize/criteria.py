@@ -1,0 +1,36 @@
+"""When a minimisation ends: tolerances, and limits on steps and time."""
+
+from __future__ import annotations
+
+from hovi.system.dataclass import dataclass
+
+
+@dataclass(frozen=True)
+class Criteria:
+    """When a minimisation ends, and what it aims at on the way.
+
+    decrease: stop when a Newton step predicts a smaller decrease, relative to the value; what
+        remains after it is of the order of its square.
+    step: stop when a Newton step is smaller than this, relative to the data.
+    max_iterations: number of steps, rejected ones included. time_limit: in [s], or None.
+    radius: first radius of the trust region, in the metric; with bounds: BoundedObjective.radii.
+    escape_saddles: leave a saddle along negative curvature; False stops there.
+    exact: stop only where rounding alone remains, after a Newton step of an exact model.
+    near: whether the first iterate is near a solution, so that a barrier begins small.
+    barrier: its last parameter, relative to the mean density of the objective.
+    enough: with bounds, stop within them where a whole Newton step predicts a smaller decrease,
+        relative to the value, even if it would be cut short.
+    stalled: without bounds, stop where STALLED_STEPS steps decrease the value by a smaller share.
+    """
+
+    decrease: float = 1e-11
+    step: float = 1e-13
+    max_iterations: int = 500
+    time_limit: float | None = None
+    radius: float = 10.0
+    escape_saddles: bool = True
+    exact: bool = False
+    near: bool = False
+    barrier: float = 1e-10
+    enough: float = 0.0
+    stalled: float = 0.0
