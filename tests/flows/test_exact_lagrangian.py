@@ -48,14 +48,14 @@ def test_w_d_has_the_leading_terms_of_the_proof(request: pytest.FixtureRequest, 
     leading = {(0, 2): (-12, 3), (0, 3): (6, 2), (1, 2): (-6, 2), (1, 3): (2, 1)}
     remainders = []
     for h in STEPS:
-        segment = ExactDiscreteLagrangian(L, h).from_start(x, p)
-        D = segment.second_derivatives[0]
+        interval = ExactDiscreteLagrangian(L, h).from_start(x, p)
+        D = interval.second_derivatives[0]
         blocks = [D[ij] - c / h**m * W for ij, (c, m) in leading.items()]
         scaled = [
             h**m * np.abs(block).max() / np.abs(c * W).max()
             for block, (c, m) in zip(blocks, leading.values(), strict=True)
         ]
-        determinant = np.linalg.det(segment.regularity_matrix[0] / (np.abs(W).max() / h**2))
+        determinant = np.linalg.det(interval.regularity_matrix[0] / (np.abs(W).max() / h**2))
         ideal = (12.0**n) * np.linalg.det(W / np.abs(W).max()) ** 2
         remainders.append([*scaled, abs(determinant / ideal - 1)])
     slopes = np.polyfit(np.log(STEPS), np.log(remainders), 1)[0]
@@ -120,8 +120,8 @@ def test_the_conjugate_point_of_the_arm_is_found(arm: EffortLagrangian) -> None:
 def test_the_tolerance_is_met(arm: EffortLagrangian, tolerance: float) -> None:
     x, p = start(arm, 3)
     best = ExactDiscreteLagrangian(arm, 0.5, 3e-13).from_start(x, p)
-    segment = ExactDiscreteLagrangian(arm, 0.5, tolerance).from_start(x, p)
-    assert np.abs(segment.p1 - best.p1).max() <= 2 * tolerance * np.abs(best.p1).max()
+    interval = ExactDiscreteLagrangian(arm, 0.5, tolerance).from_start(x, p)
+    assert np.abs(interval.p1 - best.p1).max() <= 2 * tolerance * np.abs(best.p1).max()
 
 
 def test_an_unreachable_tolerance_is_refused(arm: EffortLagrangian) -> None:

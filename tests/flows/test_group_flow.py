@@ -235,8 +235,8 @@ def test_a_step_on_a_group_is_symplectic(base: str) -> None:
 
     def step(z: Array) -> tuple[Array, Array]:
         x = robot.integrate(np.asarray(q0), z[:n])
-        segment = ld.from_start(x[None, None], (p0 + z[n:])[None, None])
-        return segment.x1[0, 0], segment.p1[0, 0]
+        interval = ld.from_start(x[None, None], (p0 + z[n:])[None, None])
+        return interval.x1[0, 0], interval.p1[0, 0]
 
     q1, p1 = step(np.zeros(2 * n))
 

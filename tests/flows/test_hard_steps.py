@@ -212,8 +212,8 @@ def test_a_batch_reports_and_finds_each_of_its_steps() -> None:
 
 def test_the_exact_flow_takes_a_hard_step() -> None:
     x, p = start("talos_arm", 0.5, 2)
-    segment = ExactDiscreteLagrangian(effort("talos_arm"), STEP, 1e-8).from_start(x[None], p[None])
-    np.testing.assert_allclose(segment.x1[0], exact_end("talos_arm", 0.5, 2)[0], atol=1e-5)
+    interval = ExactDiscreteLagrangian(effort("talos_arm"), STEP, 1e-8).from_start(x[None], p[None])
+    np.testing.assert_allclose(interval.x1[0], exact_end("talos_arm", 0.5, 2)[0], atol=1e-5)
 
 
 # Guesses
@@ -319,12 +319,12 @@ def test_an_action_is_a_number_up_to_the_largest_momenta() -> None:
     one, refused = SchemeLagrangian(spline(2), galerkin(1), STEP), 0
     for size in np.geomspace(1e152, 1e156, 100):
         try:
-            segment = one.from_start(np.zeros((1, 2, 2)), np.full((1, 2, 2), size))
+            interval = one.from_start(np.zeros((1, 2, 2)), np.full((1, 2, 2), size))
         except InputError:
             refused += 1
         else:
-            assert np.isfinite(segment.values).all()
-            assert np.isfinite(segment.step_rate).all()
+            assert np.isfinite(interval.values).all()
+            assert np.isfinite(interval.step_rate).all()
     assert 20 < refused < 80
 
 

@@ -19,6 +19,7 @@ from hovi.flows.euler_lagrange import (
     euler_lagrange_residual,
 )
 from hovi.flows.exact_lagrangian import ExactDiscreteLagrangian
+from hovi.flows.interval import FlatLagrangian
 from hovi.flows.legendre_transforms import (
     hamiltonian,
     inverse_legendre_minus,
@@ -28,7 +29,6 @@ from hovi.flows.legendre_transforms import (
     legendre_plus,
 )
 from hovi.flows.scheme_lagrangian import SchemeLagrangian
-from hovi.flows.segment import SegmentLagrangian
 from hovi.scene.casadi_lagrangian import CasadiLagrangian
 from hovi.scene.effort_lagrangian import EffortLagrangian
 from hovi.scene.scene import Scene
@@ -50,7 +50,7 @@ def arm(arm_scene: Scene) -> EffortLagrangian:
 @pytest.fixture(
     scope="module", params=["exact", "taylor-midpoint", "hermite-simpson", "galerkin-2"]
 )
-def ld(request: pytest.FixtureRequest, arm: EffortLagrangian) -> SegmentLagrangian:
+def ld(request: pytest.FixtureRequest, arm: EffortLagrangian) -> FlatLagrangian:
     if request.param == "exact":
         return ExactDiscreteLagrangian(arm, 0.1)
     return SchemeLagrangian(arm, by_name(request.param), 0.1)
@@ -149,7 +149,7 @@ def test_theorem_3_the_exact_discrete_hamiltonian_flow_is_hamiltons(
     assert relative(p1, p) < 1e-10
 
 
-def motion(ld: SegmentLagrangian) -> tuple[Array, Array, Array]:
+def motion(ld: FlatLagrangian) -> tuple[Array, Array, Array]:
     """Three nodes of a discrete motion, shape (2, 2) each."""
     x0 = JET[:2]
     p0 = fl(JET)
@@ -158,7 +158,7 @@ def motion(ld: SegmentLagrangian) -> tuple[Array, Array, Array]:
     return x0, x1, x2
 
 
-def test_theorem_2_its_diagram_commutes(ld: SegmentLagrangian) -> None:
+def test_theorem_2_its_diagram_commutes(ld: FlatLagrangian) -> None:
     x0, x1, x2 = motion(ld)
     x0, p0 = legendre_minus(ld, x0, x1)
     _, p1 = legendre_plus(ld, x0, x1)
@@ -172,7 +172,7 @@ def test_theorem_2_its_diagram_commutes(ld: SegmentLagrangian) -> None:
         assert relative(momenta, r) < 1e-11
 
 
-def test_its_corollary_the_three_forms_of_the_flow_are_equal(ld: SegmentLagrangian) -> None:
+def test_its_corollary_the_three_forms_of_the_flow_are_equal(ld: FlatLagrangian) -> None:
     x0, p0 = JET[:2], fl(JET)
     flows = [discrete_hamiltonian_flow(ld, x0, p0, form) for form in get_args(Form)]
     for x1, p1 in flows[1:]:
@@ -180,20 +180,20 @@ def test_its_corollary_the_three_forms_of_the_flow_are_equal(ld: SegmentLagrangi
         assert relative(p1, flows[0][1]) < 1e-11
 
 
-def test_legendre_transforms_and_their_inverses(ld: SegmentLagrangian) -> None:
+def test_legendre_transforms_and_their_inverses(ld: FlatLagrangian) -> None:
     x0, x1, _ = motion(ld)
     assert relative(inverse_legendre_minus(ld, *legendre_minus(ld, x0, x1))[1], x1) < 1e-12
     assert relative(inverse_legendre_plus(ld, *legendre_plus(ld, x0, x1))[0], x0) < 1e-12
 
 
-def test_a_motion_solves_the_discrete_euler_lagrange_equations(ld: SegmentLagrangian) -> None:
+def test_a_motion_solves_the_discrete_euler_lagrange_equations(ld: FlatLagrangian) -> None:
     x0, x1, x2 = motion(ld)
     scale = np.abs(legendre_plus(ld, x0, x1)[1]).max()
     assert np.abs(euler_lagrange_residual(ld, x0, x1, x2)).max() < 1e-11 * scale
     assert np.abs(euler_lagrange_residual(ld, x0, x1, x2 + 0.01)).max() > 1e-3 * scale
 
 
-def test_batches_equal_single_points(ld: SegmentLagrangian) -> None:
+def test_batches_equal_single_points(ld: FlatLagrangian) -> None:
     rng = np.random.default_rng(0)
     x0 = JET[:2] + 0.1 * rng.normal(size=(3, 2, 2))
     p0 = fl(JET) + 0.1 * rng.normal(size=(3, 2, 2))
@@ -248,9 +248,9 @@ def test_fl_of_order_three_satisfies_its_recursion() -> None:
 
 def test_d_h_of_the_exact_discrete_lagrangian_is_minus_the_energy(arm: EffortLagrangian) -> None:
     x0, p0 = JET[None, :2], fl(JET)[None]
-    segment = ExactDiscreteLagrangian(arm, H).from_start(x0, p0)
+    interval = ExactDiscreteLagrangian(arm, H).from_start(x0, p0)
     energy = hamiltonian(arm, x0, p0)
-    np.testing.assert_allclose(segment.step_derivative, -energy, rtol=1e-9)
+    np.testing.assert_allclose(interval.step_derivative, -energy, rtol=1e-9)
 
 
 def test_d_h_is_the_derivative_in_h(arm: EffortLagrangian) -> None:

@@ -29,12 +29,12 @@ from hovi.schemes import by_name, galerkin
 
 Array = npt.NDArray[np.float64]
 
-SEGMENTS = 50
+INTERVALS = 50
 
 
 def jets(n: int, size: float, count: int = 4) -> Array:
-    """(q, v, a, jerk, ...) of solutions' starts, shape (count, SEGMENTS, n)."""
-    return size * np.random.default_rng(n).normal(size=(count, SEGMENTS, n))
+    """(q, v, a, jerk, ...) of solutions' starts, shape (count, INTERVALS, n)."""
+    return size * np.random.default_rng(n).normal(size=(count, INTERVALS, n))
 
 
 @pytest.fixture(scope="module")
@@ -74,18 +74,18 @@ def test_the_slope_of_the_variational_error_is_order_plus_one_on_six_joints(
     assert measured.reliable, measured.reason
 
 
-@pytest.mark.parametrize(("r", "segments"), [(2, 8), (3, 8)])
-def test_higher_orders_in_extended_precision(arm_scene: Scene, r: int, segments: int) -> None:
-    assert extended_slope(arm_scene, r, segments) == pytest.approx(2 * (r + 2) + 1, abs=0.3)
+@pytest.mark.parametrize(("r", "intervals"), [(2, 8), (3, 8)])
+def test_higher_orders_in_extended_precision(arm_scene: Scene, r: int, intervals: int) -> None:
+    assert extended_slope(arm_scene, r, intervals) == pytest.approx(2 * (r + 2) + 1, abs=0.3)
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("r", [2, 3])
-def test_higher_orders_in_extended_precision_on_fifty_segments(arm_scene: Scene, r: int) -> None:
-    assert extended_slope(arm_scene, r, SEGMENTS) == pytest.approx(2 * (r + 2) + 1, abs=0.3)
+def test_higher_orders_in_extended_precision_on_fifty_intervals(arm_scene: Scene, r: int) -> None:
+    assert extended_slope(arm_scene, r, INTERVALS) == pytest.approx(2 * (r + 2) + 1, abs=0.3)
 
 
-def extended_slope(scene: Scene, r: int, segments: int, k: int = 2) -> float:
+def extended_slope(scene: Scene, r: int, intervals: int, k: int = 2) -> float:
     """Slope of max |L_d - L_d^e| with 40 digits; L_d^e with nine inner modes, of order 18 + 2 k."""
     mp = pytest.importorskip("mpmath")
     from oracles.extended_precision import action, graph
@@ -106,7 +106,7 @@ def extended_slope(scene: Scene, r: int, segments: int, k: int = 2) -> float:
         jerk = sum(j * j for j in jet[3]) * mp.mpf(JERK_WEIGHT) / 2 if k == 3 else 0
         return sum(u * u for u in torque(*jet[:3])) / 2 + jerk
 
-    x, p = legendre(lagrangian, *jets(2, 0.5, 2 * k)[:, :segments])
+    x, p = legendre(lagrangian, *jets(2, 0.5, 2 * k)[:, :intervals])
     errors, steps = [], [0.03, 0.021, 0.015]
     with mp.workdps(40):
         for h in steps:
@@ -120,7 +120,7 @@ def extended_slope(scene: Scene, r: int, segments: int, k: int = 2) -> float:
                         (x[i], exact.w[i], exact.inner[i]),
                     )
                 ]
-                for i in range(segments)
+                for i in range(intervals)
             ]
             errors.append(float(max(abs(a - b) for a, b in pairs)))
     return float(np.polyfit(np.log(steps), np.log(errors), 1)[0])
@@ -190,7 +190,7 @@ def nonlinear(k: int) -> CasadiLagrangian:
 def test_galerkin_has_order_2_r_plus_k_with_any_number_of_points(
     k: int, r: int, steps: list[float], more: int
 ) -> None:
-    starts = 0.7 * np.random.default_rng(k).normal(size=(2 * k, SEGMENTS, 2))
+    starts = 0.7 * np.random.default_rng(k).normal(size=(2 * k, INTERVALS, 2))
     scheme = galerkin(r, k, points=r + k + more)
     measured = variational_order(nonlinear(k), scheme, steps, *starts)
     assert measured.order == pytest.approx(2 * (r + k), abs=0.3)

@@ -69,8 +69,8 @@ def scaled(S: Array, k: int, n: int, h: float) -> Array:
 @pytest.mark.parametrize("h", [0.1, 1e-3])
 def test_the_flow_is_symplectic(arm: EffortLagrangian, name: str, h: float) -> None:
     x, p = legendre(arm, *JET)
-    segment = SchemeLagrangian(arm, by_name(name), h).from_start(x[None], p[None])
-    assert symplectic_defect(scaled(segment.tangent[0], 2, 2, h)) < 1e-12
+    interval = SchemeLagrangian(arm, by_name(name), h).from_start(x[None], p[None])
+    assert symplectic_defect(scaled(interval.tangent[0], 2, 2, h)) < 1e-12
 
 
 @pytest.mark.parametrize(("k", "r"), [(1, 0), (1, 2), (3, 0), (3, 2)])
@@ -78,8 +78,8 @@ def test_flows_of_other_orders_are_symplectic(k: int, r: int) -> None:
     jet = [ca.SX.sym(f"q{j}", 2) for j in range(k + 1)]
     L = CasadiLagrangian(jet, ca.sumsqr(jet[-1]) / 2 * (2 + ca.cos(jet[0][0])) + ca.sin(jet[0][1]))
     x, p = np.random.default_rng(k).normal(size=(2, 1, k, 2))
-    segment = SchemeLagrangian(L, galerkin(r, k), 0.2).from_start(x, p)
-    assert symplectic_defect(scaled(segment.tangent[0], k, 2, 0.2)) < 1e-12
+    interval = SchemeLagrangian(L, galerkin(r, k), 0.2).from_start(x, p)
+    assert symplectic_defect(scaled(interval.tangent[0], k, 2, 0.2)) < 1e-12
 
 
 def test_the_tangent_map_is_the_derivative_of_the_flow(arm: EffortLagrangian) -> None:
@@ -144,8 +144,8 @@ def conditions(L: Lagrangian, x: Array, p: Array, name: str, steps: Array) -> Ar
     """Condition of the step's Newton matrix, equations scaled as h p and p~ - h p."""
     found = []
     for h in steps:
-        segment = SchemeLagrangian(L, by_name(name), h).from_start(x[None], p[None])
-        found.append(np.linalg.cond(segment.newton_matrix[0]))
+        interval = SchemeLagrangian(L, by_name(name), h).from_start(x[None], p[None])
+        found.append(np.linalg.cond(interval.newton_matrix[0]))
     return np.array(found)
 
 
@@ -176,11 +176,11 @@ def test_the_condition_of_a_step_tends_to_its_limit_on_the_arm(
 def test_steps_are_accurate_as_h_tends_to_zero(arm: EffortLagrangian, h: float) -> None:
     # w1 is the mean acceleration, w0 its slope: neither loses eps/h^2 as differences would
     x, p = legendre(arm, *JET)
-    segment = SchemeLagrangian(arm, galerkin(2), h).from_start(x[None], p[None])
+    interval = SchemeLagrangian(arm, galerkin(2), h).from_start(x[None], p[None])
     W = arm.evaluate(*JET[:3, None])[2][0, 2, :, 2]
     rounding = 2 * np.finfo(float).eps * np.linalg.cond(W)  # of the acceleration from W a = p~
     for w, exact in ((1, JET[2] + h / 2 * JET[3]), (0, -h * JET[3] / np.sqrt(12))):
-        np.testing.assert_allclose(segment.w[0, w], exact, rtol=0, atol=rounding + 200 * h**2)
+        np.testing.assert_allclose(interval.w[0, w], exact, rtol=0, atol=rounding + 200 * h**2)
 
 
 # The horizon

@@ -14,8 +14,8 @@ from scipy.integrate import solve_ivp
 
 import hovi
 from hovi.errors import InputError
+from hovi.flows.charted_interval import symplectic_form
 from hovi.flows.charted_lagrangian import ChartedLagrangian
-from hovi.flows.charted_segment import symplectic_form
 from hovi.flows.legendre_transforms import highest_derivative
 from hovi.robot.space.chart import Chart
 from hovi.robot.space.configuration_space import ConfigurationSpace
@@ -88,8 +88,8 @@ def test_the_momenta_are_the_derivatives_of_the_discrete_lagrangian(
 ) -> None:
     ld, n = of(space, k), space.nv
     x0, x1 = points(space, k, ld.h)
-    segment = ld.joining(x0[None], x1[None], 0.1)
-    np.testing.assert_allclose(difference(space, x1, segment.x1[0]), 0.0, atol=1e-12)
+    interval = ld.joining(x0[None], x1[None], 0.1)
+    np.testing.assert_allclose(difference(space, x1, interval.x1[0]), 0.0, atol=1e-12)
 
     def value(d: Array) -> Array:
         ends = (moved(space, x0, d[: k * n]), moved(space, x1, d[k * n :]))
@@ -97,7 +97,7 @@ def test_the_momenta_are_the_derivatives_of_the_discrete_lagrangian(
 
     slopes = derivative(value, np.zeros(2 * k * n))[0]
     scale = np.abs(slopes).max()
-    np.testing.assert_allclose(segment.derivatives.ravel(), slopes, rtol=0, atol=1e-7 * scale)
+    np.testing.assert_allclose(interval.derivatives.ravel(), slopes, rtol=0, atol=1e-7 * scale)
 
 
 @each_space
@@ -137,7 +137,7 @@ def test_the_derivative_in_the_step_is_minus_the_energy(k: int) -> None:
 
 
 @each_order
-def test_time_runs_from_the_start_of_the_segment(k: int) -> None:
+def test_time_runs_from_the_start_of_the_interval(k: int) -> None:
     """Of L with sin(t) at t0 = 0.7, as of L with sin(t + 0.7) at 0."""
     base, t = lagrangian_on(ROTATIONS, k), ca.SX.sym("t")
     late, early = (
@@ -165,15 +165,15 @@ def test_a_batch_is_its_members(k: int) -> None:
     ld = of(ROTATIONS, k)
     pairs = [points(ROTATIONS, k, ld.h, seed) for seed in range(3)]
     x0, x1 = (np.stack(each) for each in zip(*pairs, strict=True))
-    segment = ld.joining(x0, x1)
-    assert segment.values.shape == (3,)
+    interval = ld.joining(x0, x1)
+    assert interval.values.shape == (3,)
     for i, (a, b) in enumerate(pairs):
         one = ld.joining(a[None], b[None])
-        np.testing.assert_array_equal(segment.p0[i], one.p0[0])
-        np.testing.assert_array_equal(segment.hessian[i], one.hessian[0])
-        np.testing.assert_array_equal(hovi.legendre_plus(ld, a, b)[1], segment.p1[i])
-    there = ld.from_start(x0, segment.p0)
-    np.testing.assert_allclose(there.x1, segment.x1, rtol=0, atol=1e-11)
+        np.testing.assert_array_equal(interval.p0[i], one.p0[0])
+        np.testing.assert_array_equal(interval.hessian[i], one.hessian[0])
+        np.testing.assert_array_equal(hovi.legendre_plus(ld, a, b)[1], interval.p1[i])
+    there = ld.from_start(x0, interval.p0)
+    np.testing.assert_allclose(there.x1, interval.x1, rtol=0, atol=1e-11)
 
 
 # Legendre transforms and flows
@@ -214,15 +214,15 @@ def test_the_tangent_of_the_flow_is_its_derivative_and_symplectic(
     ld, n = of(space, k, h=0.3), space.nv
     x0, x1 = points(space, k, ld.h)
     p0 = hovi.legendre_minus(ld, x0, x1)[1]
-    segment = ld.from_start(x0[None], p0[None])
-    end, p1 = segment.x1[0], segment.p1[0]
+    interval = ld.from_start(x0[None], p0[None])
+    end, p1 = interval.x1[0], interval.p1[0]
 
     def step(d: Array) -> Array:
         start = moved(space, x0, d[: k * n])
         there = ld.from_start(start[None], p0[None] + d[k * n :].reshape(1, k, n))
         return np.append(difference(space, end, there.x1[0]), (there.p1[0] - p1).ravel())
 
-    D = segment.tangent[0]
+    D = interval.tangent[0]
     numbers = derivative(step, np.zeros(2 * k * n))
     np.testing.assert_allclose(D, numbers, rtol=0, atol=2e-7 * np.abs(D).max())
     form = D.T @ symplectic_form(space, p1) @ D
@@ -255,14 +255,14 @@ def test_the_exact_flow_is_that_of_the_differential_equations(k: int) -> None:
     y = solve_ivp(rates, (0, h), np.concatenate(jet), "DOP853", rtol=1e-13, atol=1e-14).y[:, -1]
     x, p = hovi.legendre(L, *jet)
     exact = hovi.ExactDiscreteLagrangian(L, h)
-    segment = exact.from_start(x[None], p[None])
+    interval = exact.from_start(x[None], p[None])
     expected = y[:4] if k == 1 else y[:7]
-    np.testing.assert_allclose(segment.x1[0, 0], expected, rtol=0, atol=1e-11)
+    np.testing.assert_allclose(interval.x1[0, 0], expected, rtol=0, atol=1e-11)
     between = exact.joining(x[None], expected[None, None])
     np.testing.assert_allclose(between.p0[0], p, rtol=0, atol=1e-11)
-    back = exact.from_end(segment.x1, segment.p1)
+    back = exact.from_end(interval.x1, interval.p1)
     np.testing.assert_allclose(back.x0, x[None], rtol=0, atol=1e-10)
-    np.testing.assert_allclose(exact.value(x[None], segment.x1), segment.values, rtol=1e-10)
+    np.testing.assert_allclose(exact.value(x[None], interval.x1), interval.values, rtol=1e-10)
 
 
 def test_the_exact_discrete_lagrangian_ends_at_the_conjugate_point() -> None:

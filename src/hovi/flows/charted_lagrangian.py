@@ -24,11 +24,11 @@ from hovi.checks.arguments import check_arguments, unchecked
 from hovi.checks.shapes import require_shape
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.errors import InputError, SchemeError
-from hovi.flows.charted_interval import ChartedInterval, root_of
-from hovi.flows.charted_segment import ChartedSegment, NodalExpansion, joined
+from hovi.flows.charted_equations import ChartedEquations, root_of
+from hovi.flows.charted_interval import ChartedInterval, NodalExpansion, joined
+from hovi.flows.interval import IntervalLagrangian
 from hovi.flows.legendre_transforms import jet_at_momenta
 from hovi.flows.scheme_lagrangian import check_step, uniform_grid
-from hovi.flows.segment import IntervalLagrangian
 from hovi.flows.step_guesses import (
     DOUBTFUL,
     Trial,
@@ -81,9 +81,9 @@ class ChartedLagrangian(IntervalLagrangian):
         return cls(ld.lagrangian, space, *uniform_grid(ld))
 
     @cached_property
-    def interval(self) -> ChartedInterval:
+    def interval(self) -> ChartedEquations:
         """The interval as a function of its start and its modes."""
-        return ChartedInterval(self.lagrangian, self.space, self.scheme, self.h)
+        return ChartedEquations(self.lagrangian, self.space, self.scheme, self.h)
 
     def split(self, x: Array) -> list[Array]:
         """(q, q', ..) of rows x (N, nq + (k - 1) nv)."""
@@ -95,9 +95,9 @@ class ChartedLagrangian(IntervalLagrangian):
         return True
 
     def from_start(
-        self, x0: Array, p0: Array, t0: float = 0.0, guess: ChartedSegment | None = None
-    ) -> ChartedSegment:
-        """The segments that start at points (B, 1, nq + ..) with momenta (B, k, nv).
+        self, x0: Array, p0: Array, t0: float = 0.0, guess: ChartedInterval | None = None
+    ) -> ChartedInterval:
+        """The intervals that start at points (B, 1, nq + ..) with momenta (B, k, nv).
 
         By Newton's method, from the curve of `guess` continued or the exact jet, and where it fails
         from the curve of shorter steps. Raises InputError if there is none, or if it rotates too
@@ -115,10 +115,10 @@ class ChartedLagrangian(IntervalLagrangian):
         if trial.end is None or not doubt < DOUBTFUL:
             trial = hard_step(self._attempt, self.h, x0, p0, t0, trial)
         assert trial.end is not None
-        return self._segment(x0, trial.modes, *trial.end, t0)
+        return self._interval(x0, trial.modes, *trial.end, t0)
 
-    def from_end(self, x1: Array, p1: Array, t0: float = 0.0) -> ChartedSegment:
-        """The segments that end at points (B, 1, nq + ..) with momenta (B, k, nv): (F^+)^-1.
+    def from_end(self, x1: Array, p1: Array, t0: float = 0.0) -> ChartedInterval:
+        """The intervals that end at points (B, 1, nq + ..) with momenta (B, k, nv): (F^+)^-1.
 
         By Newton's method from the exact jet. Raises InputError if there is none.
         """
@@ -144,10 +144,10 @@ class ChartedLagrangian(IntervalLagrangian):
         modes = u.reshape(guess.shape)
         start, interval = self.interval.ending_at(x1[0], modes)
         p = self.interval.momenta(interval, start, t0)[1]
-        return self._segment(start[None], modes[0], x1, p, t0)
+        return self._interval(start[None], modes[0], x1, p, t0)
 
-    def joining(self, x0: Array, x1: Array, t0: float = 0.0) -> ChartedSegment:
-        """The segments between two points of T^(k-1)Q, (B, 1, nq + ..) each.
+    def joining(self, x0: Array, x1: Array, t0: float = 0.0) -> ChartedInterval:
+        """The intervals between two points of T^(k-1)Q, (B, 1, nq + ..) each.
 
         With the smallest rotation. Raises InputError if Newton's method fails.
         """
@@ -162,8 +162,8 @@ class ChartedLagrangian(IntervalLagrangian):
             z = np.stack([(z[0] - v0) / self.h, (dx - v0) / self.h], axis=1)
         return self.between(x0, self.regularized.w_of_z(z), t0)
 
-    def between(self, x0: Array, w: Array, t0: float = 0.0) -> ChartedSegment:
-        """The segments with given regularized ends (B, k, nv), by Newton's method for the modes."""
+    def between(self, x0: Array, w: Array, t0: float = 0.0) -> ChartedInterval:
+        """The intervals with regularized ends w (B, k, nv), by Newton's method for the modes."""
         self._require(x0, w)
         if len(x0) > 1:
             return joined([self.between(x, y, t0) for x, y in _pairs(x0, w)])
@@ -181,9 +181,11 @@ class ChartedLagrangian(IntervalLagrangian):
         modes = curve(root_of(system, u, self.h) if r else u)
         interval = self.interval.charts(start, modes)
         p1 = self.interval.momenta(interval, start, t0)[1]
-        return self._segment(x0, modes[0], self.interval.end(start, interval)[None], p1, t0)
+        return self._interval(x0, modes[0], self.interval.end(start, interval)[None], p1, t0)
 
-    def _segment(self, x0: Array, modes: Array, x1: Array, p1: Array, t0: float) -> ChartedSegment:
+    def _interval(
+        self, x0: Array, modes: Array, x1: Array, p1: Array, t0: float
+    ) -> ChartedInterval:
         w, inner = modes[None, : self.k], modes[None, self.k :]
         z = self.regularized.z(w)
 
@@ -198,7 +200,7 @@ class ChartedLagrangian(IntervalLagrangian):
             weights, own = self.scheme.weights[None], value - np.sum(work, axis=0)
             return NodalExpansion(self.h * weights @ value, p0, blocks, weights @ own)
 
-        return ChartedSegment(self.space, self.h, x0, w, z, inner, x1, p1, expand)
+        return ChartedInterval(self.space, self.h, x0, w, z, inner, x1, p1, expand)
 
     @unchecked
     def _require(self, x: Array, p: Array | None = None, x1: Array | None = None) -> None:

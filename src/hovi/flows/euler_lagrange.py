@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.checks.arguments import check_arguments
+from hovi.flows.interval import IntervalLagrangian
 from hovi.flows.legendre_transforms import (
     batch,
     inverse_legendre_minus,
@@ -21,7 +22,6 @@ from hovi.flows.legendre_transforms import (
     legendre_plus,
     unbatched,
 )
-from hovi.flows.segment import IntervalLagrangian
 from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
@@ -75,8 +75,8 @@ def discrete_hamiltonian_flow(
     They are equal [ColomboFerraroMartin2016, corollary to theorem 2].
     """
     if form == "momentum":
-        segment = ld.from_start(batch(x0), batch(p0))
-        return unbatched(x0, segment.x1), unbatched(x0, segment.p1)
+        interval = ld.from_start(batch(x0), batch(p0))
+        return unbatched(x0, interval.x1), unbatched(x0, interval.p1)
     if form == "plus":
         ends = discrete_lagrangian_map(ld, *inverse_legendre_plus(ld, x0, p0))
         return legendre_plus(ld, *ends)

@@ -16,17 +16,17 @@ from scipy.optimize import brentq
 from hovi.checks.arguments import check_arguments
 from hovi.checks.shapes import require_shape
 from hovi.errors import InputError
+from hovi.flows.charted_interval import ChartedInterval
 from hovi.flows.charted_lagrangian import ChartedLagrangian
-from hovi.flows.charted_segment import ChartedSegment
+from hovi.flows.interval import Interval, IntervalLagrangian, flat
 from hovi.flows.scheme_lagrangian import SchemeLagrangian, check_step
-from hovi.flows.segment import IntervalLagrangian, Segment, flat
 from hovi.scene.lagrangian import Lagrangian
 from hovi.schemes import Scheme, galerkin
 from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 
-AnySegment = Segment | ChartedSegment
+AnyInterval = Interval | ChartedInterval
 Approximation = SchemeLagrangian | ChartedLagrangian
 
 INNER_MODES = (4, 7, 10, 14, 19, 25, 32, 40)
@@ -51,34 +51,34 @@ class ExactDiscreteLagrangian(IntervalLagrangian):
     def __post_init__(self) -> None:
         check_step(self.h)
 
-    def between(self, x0: Array, w: Array, t0: float = 0.0) -> AnySegment:
+    def between(self, x0: Array, w: Array, t0: float = 0.0) -> AnyInterval:
         """The exact solution with given ends, in regularized coordinates."""
         return self._raised(lambda ld: ld.between(x0, w, t0))
 
-    def joining(self, x0: Array, x1: Array, t0: float = 0.0) -> AnySegment:
+    def joining(self, x0: Array, x1: Array, t0: float = 0.0) -> AnyInterval:
         """The exact solution between two points of T^(k-1)Q."""
         return self._raised(lambda ld: ld.joining(x0, x1, t0))
 
     def from_start(
-        self, x0: Array, p0: Array, t0: float = 0.0, guess: AnySegment | None = None
-    ) -> AnySegment:
+        self, x0: Array, p0: Array, t0: float = 0.0, guess: AnyInterval | None = None
+    ) -> AnyInterval:
         """The exact solution that starts at (x0, p0): F_H, by theorem 3; `guess` is not used."""
         return self._raised(lambda ld: ld.from_start(x0, p0, t0))
 
-    def from_end(self, x1: Array, p1: Array, t0: float = 0.0) -> AnySegment:
+    def from_end(self, x1: Array, p1: Array, t0: float = 0.0) -> AnyInterval:
         """The exact solution that ends at (x1, p1)."""
         return self._raised(lambda ld: ld.from_end(x1, p1, t0))
 
-    def _raised(self, solve: Callable[[Approximation], AnySegment]) -> AnySegment:
+    def _raised(self, solve: Callable[[Approximation], AnyInterval]) -> AnyInterval:
         """Raise the degree until the ends and their momenta stop changing."""
-        before: AnySegment | None = None
+        before: AnyInterval | None = None
         for inner_modes in INNER_MODES:
             table = _table(inner_modes, self.k)
-            segment = solve(approximation(self.lagrangian, table, self.h))
-            if before is not None and _change(before, segment) <= self.tolerance:
-                _refuse_conjugate_points(segment)
-                return segment
-            before = segment
+            interval = solve(approximation(self.lagrangian, table, self.h))
+            if before is not None and _change(before, interval) <= self.tolerance:
+                _refuse_conjugate_points(interval)
+                return interval
+            before = interval
         raise InputError(
             f"the exact discrete Lagrangian did not converge to {self.tolerance:g} at "
             f"h = {self.h:g} s with {INNER_MODES[-1]} inner modes; use a shorter step or a larger "
@@ -113,8 +113,8 @@ def conjugate_time(lagrangian: Lagrangian, x0: Array, p0: Array, longest: float)
     scheme = _table(INNER_MODES[-1], lagrangian.order)
 
     def least(h: float) -> float:
-        segment = approximation(lagrangian, scheme, h).from_start(x0[None], p0[None])
-        return float(_inner_eigenvalues(segment)[0, 0])
+        interval = approximation(lagrangian, scheme, h).from_start(x0[None], p0[None])
+        return float(_inner_eigenvalues(interval)[0, 0])
 
     h = longest / 16
     while least(h) > 0:
@@ -124,7 +124,7 @@ def conjugate_time(lagrangian: Lagrangian, x0: Array, p0: Array, longest: float)
     return float(brentq(least, h / 1.25 if h > longest / 16 else longest * 1e-3, h, xtol=1e-12))
 
 
-def _change(before: AnySegment, after: AnySegment) -> float:
+def _change(before: AnyInterval, after: AnyInterval) -> float:
     """The relative change by a higher degree, of the derivatives of phi in (h x0, w) and the ends.
 
     On groups of L_d in (q0, h v0, q1, h v1).
@@ -137,23 +137,23 @@ def _change(before: AnySegment, after: AnySegment) -> float:
     return float(max(changes))
 
 
-def _refuse_conjugate_points(segment: AnySegment) -> None:
-    negative = _inner_eigenvalues(segment) < 0
-    r = segment.inner.shape[1]
-    last = segment.hessian[:, -1, -1]
+def _refuse_conjugate_points(interval: AnyInterval) -> None:
+    negative = _inner_eigenvalues(interval) < 0
+    r = interval.inner.shape[1]
+    last = interval.hessian[:, -1, -1]
     indefinite = np.sum(np.linalg.eigvalsh((last + last.transpose(0, 2, 1)) / 2) < 0, axis=1)
     passed = int(np.max(np.sum(negative, axis=1) - r * indefinite))
     if passed > 0:
         raise InputError(
-            f"h = {segment.h:g} s is too long for the exact discrete Lagrangian: {passed} "
+            f"h = {interval.h:g} s is too long for the exact discrete Lagrangian: {passed} "
             "conjugate point(s) lie before its end, so the solution between the two ends does not "
             "minimize the action; use a shorter step."
         )
 
 
-def _inner_eigenvalues(segment: AnySegment) -> Array:
-    m = 2 * segment.k * segment.w.shape[2]
-    inner = flat(segment.hessian)[:, m:, m:]
+def _inner_eigenvalues(interval: AnyInterval) -> Array:
+    m = 2 * interval.k * interval.w.shape[2]
+    inner = flat(interval.hessian)[:, m:, m:]
     return np.asarray(np.linalg.eigvalsh((inner + inner.transpose(0, 2, 1)) / 2))
 
 

@@ -18,7 +18,7 @@ import numpy.typing as npt
 from hovi.checks.arguments import check_arguments
 from hovi.checks.shapes import require_shape
 from hovi.errors import InputError, some_of
-from hovi.flows.segment import IntervalLagrangian
+from hovi.flows.interval import IntervalLagrangian
 from hovi.optimize.batched_newton import newton
 from hovi.scene.casadi_lagrangian import CasadiLagrangian
 from hovi.scene.lagrangian import Lagrangian
@@ -36,15 +36,15 @@ INVOLVED = 0.1
 @check_arguments
 def legendre_minus(ld: IntervalLagrangian, x0: Array, x1: Array) -> tuple[Array, Array]:
     """F^- L_d: (x0, x1) -> (x0, p0) with p0 = (-D_1 L_d, ..., -D_k L_d)."""
-    segment = ld.joining(batch(x0), batch(x1))
-    return x0, unbatched(x0, segment.p0)
+    interval = ld.joining(batch(x0), batch(x1))
+    return x0, unbatched(x0, interval.p0)
 
 
 @check_arguments
 def legendre_plus(ld: IntervalLagrangian, x0: Array, x1: Array) -> tuple[Array, Array]:
     """F^+ L_d: (x0, x1) -> (x1, p1) with p1 = (D_{k+1} L_d, ..., D_2k L_d)."""
-    segment = ld.joining(batch(x0), batch(x1))
-    return x1, unbatched(x1, segment.p1)
+    interval = ld.joining(batch(x0), batch(x1))
+    return x1, unbatched(x1, interval.p1)
 
 
 @check_arguments

@@ -17,8 +17,8 @@ from hovi.checks.shapes import require_shape
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import MAX_STEP, MIN_STEP
 from hovi.errors import InputError, SchemeError
+from hovi.flows.interval import FlatLagrangian, Interval, flat
 from hovi.flows.legendre_transforms import jet_at_momenta
-from hovi.flows.segment import Segment, SegmentLagrangian, flat
 from hovi.flows.step_guesses import (
     DOUBTFUL,
     Trial,
@@ -37,7 +37,7 @@ Array = npt.NDArray[np.float64]
 
 @check_arguments
 @dataclass(frozen=True, eq=False)
-class SchemeLagrangian(SegmentLagrangian):
+class SchemeLagrangian(FlatLagrangian):
     """L_d = h sum_j w_j L(q_j, q'_j, ..., q^(k)_j), extremal in the inner modes.
 
     lagrangian: L on T^(k)Q. scheme: a table for the same k. h: in [s].
@@ -68,12 +68,12 @@ class SchemeLagrangian(SegmentLagrangian):
         """The L_d of the intervals of a uniform grid."""
         return cls(ld.lagrangian, *uniform_grid(ld))
 
-    def between(self, x0: Array, w: Array, t0: float = 0.0) -> Segment:
+    def between(self, x0: Array, w: Array, t0: float = 0.0) -> Interval:
         """Newton's method for the inner modes."""
         self.require_points(x0=x0, w=w)
         B, k, r, n = len(x0), self.k, self.scheme.inner_modes, self.n
         if r == 0:
-            return self._segment(x0, w, np.zeros((B, 0, n)), t0)
+            return self._interval(x0, w, np.zeros((B, 0, n)), t0)
 
         def system(u: Array) -> tuple[Array, Array]:
             gradient, H = self._system(x0, w, u.reshape(B, r, n), t0)
@@ -81,14 +81,14 @@ class SchemeLagrangian(SegmentLagrangian):
             return gradient.reshape(B, -1)[:, m:], H[:, m:, m:]
 
         u = self._solve(system, np.zeros((B, r * n)))
-        return self._segment(x0, w, u.reshape(B, r, n), t0)
+        return self._interval(x0, w, u.reshape(B, r, n), t0)
 
     def from_start(
-        self, x0: Array, p0: Array, t0: float = 0.0, guess: Segment | None = None
-    ) -> Segment:
+        self, x0: Array, p0: Array, t0: float = 0.0, guess: Interval | None = None
+    ) -> Interval:
         """Newton's method for (w, c): phi_w = gamma^T (S/h) T^-T (p0 + h phi_x), phi_c = 0.
 
-        It starts from the curve of `guess` continued, the segment before, or from the exact jet at
+        It starts from the curve of `guess` continued, the interval before, or from the exact jet at
         (x0, p0). Where it fails or ends far from there, shorter steps decide: see `hard_step`.
         """
         self.require_points(x0=x0, p0=p0)
@@ -106,7 +106,7 @@ class SchemeLagrangian(SegmentLagrangian):
             first = Trial(u[i], float(found.residual[i]), end)
             u[i] = hard_step(self._attempt, self.h, start, p, t0, first).modes
         w, inner = self._split(u, B)
-        return self._segment(x0, w, inner, t0)
+        return self._interval(x0, w, inner, t0)
 
     def _step(self, x0: Array, p0: Array, t0: float) -> System:
         """The equations of a step from momenta and their matrix, in the modes."""
@@ -135,15 +135,15 @@ class SchemeLagrangian(SegmentLagrangian):
 
     def _end(self, x0: Array, modes: Array, t0: float) -> tuple[Array, Array]:
         """x1 and p1."""
-        segment = self.at(x0, *self._split(modes, len(x0)), t0)
-        return segment.x1, segment.p1
+        interval = self.at(x0, *self._split(modes, len(x0)), t0)
+        return interval.x1, interval.p1
 
     def _taylor(self, x: Array, p: Array, t: float, at: float = 0.0) -> Array:
         """Modes of the exact jet at one end, s = `at`, shape (B, k + r, n)."""
         jet = jet_at_momenta(self.lagrangian, list(np.moveaxis(x, 1, 0)), p, t)
         return taylor_modes(self.k, self.k + self.scheme.inner_modes, self.h, *jet, at)
 
-    def from_end(self, x1: Array, p1: Array, t0: float = 0.0) -> Segment:
+    def from_end(self, x1: Array, p1: Array, t0: float = 0.0) -> Interval:
         """Newton's method for (w, c): phi_w = gamma^T (S/h) p1, phi_c = 0, with x0 from w."""
         self.require_points(x1=x1, p1=p1)
         B, m, R = len(x1), self.k * self.n, self.regularized
@@ -160,13 +160,13 @@ class SchemeLagrangian(SegmentLagrangian):
 
         first = self._taylor(x1, p1, t0 + self.h, 1.0).reshape(B, -1)
         w, inner = self._split(self._solve(system, first), B)
-        return self._segment(R.start(x1, w), w, inner, t0)
+        return self._interval(R.start(x1, w), w, inner, t0)
 
-    def at(self, x0: Array, w: Array, inner: Array, t0: float = 0.0) -> Segment:
-        """The segment with given inner modes, which are assumed to be extremal."""
+    def at(self, x0: Array, w: Array, inner: Array, t0: float = 0.0) -> Interval:
+        """The interval with given inner modes, which are assumed to be extremal."""
         self.require_points(x0=x0, w=w)
         require_shape("inner", inner, len(x0), self.scheme.inner_modes, self.n)
-        return self._segment(x0, w, inner, t0)
+        return self._interval(x0, w, inner, t0)
 
     @unchecked
     def jet(self, x0: Array, w: Array, inner: Array) -> list[Array]:
@@ -190,8 +190,8 @@ class SchemeLagrangian(SegmentLagrangian):
         return self._contract(gradient), flat(self._contract_twice(hessian))
 
     @np.errstate(over="ignore", invalid="ignore")
-    def _segment(self, x0: Array, w: Array, inner: Array, t0: float) -> Segment:
-        """The segment with these modes. Raises InputError for an action that is not finite."""
+    def _interval(self, x0: Array, w: Array, inner: Array, t0: float) -> Interval:
+        """The interval with these modes. Raises InputError for an action that is not finite."""
         jet = self.jet(x0, w, inner)
         value, gradient, hessian = self._evaluate(jet, t0)
         values = value.reshape(len(x0), -1) @ self.scheme.weights
@@ -199,11 +199,11 @@ class SchemeLagrangian(SegmentLagrangian):
         scaled = (value - np.sum(slopes, axis=0)).reshape(len(x0), -1) @ self.scheme.weights
         if not np.isfinite([values, scaled]).all():
             raise InputError(
-                f"the action of a segment of h = {self.h:g} s is not a finite number: use smaller "
-                "states and momenta."
+                f"the action of an interval of h = {self.h:g} s is not a finite number: use "
+                "smaller states and momenta."
             )
         G, H = self._contract(gradient), self._contract_twice(hessian)
-        return Segment(self.scheme, self.h, x0, w, inner, self.h * values, G, H, scaled)
+        return Interval(self.scheme, self.h, x0, w, inner, self.h * values, G, H, scaled)
 
     def _evaluate(self, jet: list[Array], t0: float) -> tuple[Array, Array, Array]:
         Q = len(self.scheme.weights)
@@ -247,7 +247,7 @@ class SchemeLagrangian(SegmentLagrangian):
         root, found = newton(system, u)
         if not found.all():
             raise InputError(
-                f"the discrete equations of a segment of h = {self.h:g} s have no solution near "
+                f"the discrete equations of an interval of h = {self.h:g} s have no solution near "
                 "the initial guess: use a shorter step or smaller momenta."
             )
         return root

@@ -23,8 +23,9 @@ from hovi.discrete.grid import DiscretePath, Grid
 from hovi.discrete.state import State
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError
+from hovi.flows.charted_interval import ChartedInterval
 from hovi.flows.charted_lagrangian import ChartedLagrangian
-from hovi.flows.charted_segment import ChartedSegment
+from hovi.flows.interval import Interval, IntervalLagrangian
 from hovi.flows.legendre_transforms import (
     coordinates_in_words,
     hamiltonian,
@@ -32,7 +33,6 @@ from hovi.flows.legendre_transforms import (
     require_regular_lagrangian,
 )
 from hovi.flows.scheme_lagrangian import SchemeLagrangian, uniform_grid
-from hovi.flows.segment import IntervalLagrangian, Segment
 from hovi.flows.symmetry import Symmetry
 from hovi.scene.scene import Scene
 from hovi.schemes import require_regular
@@ -97,8 +97,8 @@ class Flow:
         if not isinstance(self.ld, SchemeLagrangian):
             raise InputError("only the L_d of a scheme can be evaluated from its inner modes.")
         w = self.ld.regularized.w_of_z(self.z)
-        segment = self.ld.at(self.x[:-1], w, self.inner)
-        return segment.p0, segment.p1
+        interval = self.ld.at(self.x[:-1], w, self.inner)
+        return interval.p0, interval.p1
 
     @property
     def trajectory(self) -> Trajectory:
@@ -142,32 +142,32 @@ def flow(
     singular in q^(k) at the start (passive joints, costs of a curve's shape alone), SchemeError for
     a scheme that is not regular.
     """
-    segment = _segment(ld) if isinstance(ld, DiscreteLagrangian) else ld
-    if isinstance(segment, SchemeLagrangian | ChartedLagrangian) and segment.k == 2:
-        require_regular(segment.scheme)
-    x, p = _start(segment, z0, p0)
+    single = _of_one_interval(ld) if isinstance(ld, DiscreteLagrangian) else ld
+    if isinstance(single, SchemeLagrangian | ChartedLagrangian) and single.k == 2:
+        require_regular(single.scheme)
+    x, p = _start(single, z0, p0)
     if steps < 1:
         raise InputError(f"the number of steps must be 1 or more, got {steps}.")
-    require_regular_lagrangian(segment.lagrangian, _jet(segment, x), p[None], t0)
-    stepper = _stepper(segment, x, p, t0)
+    require_regular_lagrangian(single.lagrangian, _jet(single, x), p[None], t0)
+    stepper = _stepper(single, x, p, t0)
     monitor = None
-    if not force and not segment.on_group:
-        monitor = _RoundingMonitor(segment, x, p, tolerance)
-    records = _allocate(segment, x, p, steps)
+    if not force and not single.on_group:
+        monitor = _RoundingMonitor(single, x, p, tolerance)
+    records = _allocate(single, x, p, steps)
     for i in range(steps):
         done = stepper.step()
-        if i == 0 and isinstance(done, Segment):
-            _require_regular_step(segment, done)
+        if i == 0 and isinstance(done, Interval):
+            _require_regular_step(single, done)
         records[0][i + 1], records[1][i + 1] = stepper.x, stepper.p
         records[2][i], records[3][i, : done.inner.shape[1]] = done.z[0], done.inner[0]
-        if monitor is not None and isinstance(done, Segment):
-            monitor.propagate(done, stepper.x, (i + 1) * segment.h)
-    t = np.asarray(t0 + np.arange(steps + 1) * segment.h)
+        if monitor is not None and isinstance(done, Interval):
+            monitor.propagate(done, stepper.x, (i + 1) * single.h)
+    t = np.asarray(t0 + np.arange(steps + 1) * single.h)
     rounding = None if monitor is None else np.array(monitor.errors)
-    return Flow(segment, t, *records, rounding, symmetries or {})
+    return Flow(single, t, *records, rounding, symmetries or {})
 
 
-def _segment(ld: DiscreteLagrangian) -> SchemeLagrangian | ChartedLagrangian:
+def _of_one_interval(ld: DiscreteLagrangian) -> SchemeLagrangian | ChartedLagrangian:
     space, (scheme, h) = ld.lagrangian.space, uniform_grid(ld)
     if space is None:
         return SchemeLagrangian(ld.lagrangian, scheme, h)
@@ -185,20 +185,20 @@ class _ChartedStepper:
 
     def __init__(self, ld: IntervalLagrangian, x: Array, p: Array, t0: float) -> None:
         self.ld, self.x, self.p, self.t0 = ld, x, p, t0
-        self._segment: ChartedSegment | None = None
+        self._interval: ChartedInterval | None = None
         self._steps = 0
 
-    def step(self) -> ChartedSegment:
+    def step(self) -> ChartedInterval:
         """One step: F^+ o (F^-)^-1."""
         t = self.t0 + self._steps * self.ld.h
         try:
-            segment = self.ld.from_start(self.x[None], self.p[None], t, self._segment)
+            interval = self.ld.from_start(self.x[None], self.p[None], t, self._interval)
         except InputError as failure:
             raise _ended(t, self._steps + 1, failure) from failure
-        assert isinstance(segment, ChartedSegment)
-        self.x, self.p, self._segment = segment.x1[0], segment.p1[0], segment
+        assert isinstance(interval, ChartedInterval)
+        self.x, self.p, self._interval = interval.x1[0], interval.p1[0], interval
         self._steps += 1
-        return segment
+        return interval
 
 
 class _Stepper:
@@ -212,24 +212,24 @@ class _Stepper:
         self._moments = R.moments
         self._momentum_taylor = R.inverse_taylor.T - np.eye(ld.k)
         self._kick = ld.h * R.inverse_taylor.T
-        self._segment: Segment | None = None
+        self._interval: Interval | None = None
         self._steps = 0
 
-    def step(self) -> Segment:
+    def step(self) -> Interval:
         """One step: F^+ o (F^-)^-1."""
         t = self.t0 + self._steps * self.ld.h
         try:
-            segment = self.ld.from_start(self.x[None], self.p[None], t, self._segment)
+            interval = self.ld.from_start(self.x[None], self.p[None], t, self._interval)
         except InputError as failure:
             raise _ended(t, self._steps + 1, failure) from failure
-        assert isinstance(segment, Segment)
-        dx = self._taylor @ self.x + self._moments @ segment.w[0]
-        dp = self._momentum_taylor @ self.p + self._kick @ segment.gradient[0, : self.ld.k]
+        assert isinstance(interval, Interval)
+        dx = self._taylor @ self.x + self._moments @ interval.w[0]
+        dp = self._momentum_taylor @ self.p + self._kick @ interval.gradient[0, : self.ld.k]
         self.x, self._remainder[0] = compensated(self.x, dx, self._remainder[0])
         self.p, self._remainder[1] = compensated(self.p, dp, self._remainder[1])
-        self._segment = segment
+        self._interval = interval
         self._steps += 1
-        return segment
+        return interval
 
 
 def _ended(t: float, step: int, failure: InputError) -> InputError:
@@ -246,9 +246,9 @@ class _RoundingMonitor:
         self._n, self._tolerance, self._size = ld.n, tolerance, sizes[0]
         self.errors = [EPS * float(sizes[0])]
 
-    def propagate(self, segment: Segment, x: Array, t: float) -> None:
+    def propagate(self, interval: Interval, x: Array, t: float) -> None:
         """Propagate by one step. Raises InputError if the error exceeds the tolerance."""
-        self._tangent = segment.tangent[0] @ self._tangent
+        self._tangent = interval.tangent[0] @ self._tangent
         self._size = max(self._size, float(np.abs(x[0]).max()))
         self.errors.append(float(np.linalg.norm(self._tangent[: self._n], 2)))
         if not self.errors[-1] <= self._tolerance * self._size:
@@ -297,9 +297,9 @@ def _rows_apart(ld: IntervalLagrangian, x: Array) -> list[Array]:
     return np.split(x, [ld.lagrangian.nq], axis=1)[: ld.k]
 
 
-def _require_regular_step(ld: IntervalLagrangian, segment: Segment) -> None:
+def _require_regular_step(ld: IntervalLagrangian, interval: Interval) -> None:
     """Raise InputError where the discrete Lagrangian is singular: W_d, and a step's equations."""
-    own, carried = segment.newton_terms
+    own, carried = interval.newton_terms
     kernel = kernel_coordinates((own - carried)[0], ld.n, (np.abs(own) + np.abs(carried))[0])
     if len(kernel):
         raise InputError(
