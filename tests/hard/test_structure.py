@@ -14,7 +14,6 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 import pytest
-from hovi.optimize.criteria import Criteria
 
 from hard import naive
 from hard.case import Case, Outcome, parameters
@@ -22,6 +21,7 @@ from hard.scenes import HANG_JET, UP_JET, hanging, links, uneven
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import DiscretePath
 from hovi.errors import HoviError
+from hovi.optimize.criteria import Criteria
 from hovi.optimize.trust_region import minimize
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.search.planner import plan

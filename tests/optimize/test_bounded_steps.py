@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 import pytest
-from hovi.optimize.criteria import Criteria
-from hovi.optimize.ended import Reason
 
 from hovi.optimize.barrier import Barrier, Bounds
 from hovi.optimize.bordered_model import EquationModel
 from hovi.optimize.bounded_objective import BoundedOutcome, Refinement
 from hovi.optimize.bounded_steps import FULL_REACTION_SHARE, BoundedSteps
+from hovi.optimize.criteria import Criteria
+from hovi.optimize.ended import Reason
 from hovi.optimize.interior_point import OUTSIDE_RADIUS, minimize_bounded
 from hovi.optimize.quadratic_model import QuadraticModel
 from optimize.test_interior_point import DenseModel, Quadratic

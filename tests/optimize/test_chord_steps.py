@@ -6,10 +6,10 @@ import casadi as ca
 import numpy as np
 import numpy.typing as npt
 import pytest
-from hovi.optimize.criteria import Criteria
-from hovi.optimize.ended import Reason
 
 from hovi.optimize.chord_steps import MAX_CHORD_STEPS, polish
+from hovi.optimize.criteria import Criteria
+from hovi.optimize.ended import Reason
 from hovi.optimize.quadratic_model import Factor, QuadraticModel
 from hovi.optimize.trust_region import minimize
 from optimize.test_trust_region import Smooth

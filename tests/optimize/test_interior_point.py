@@ -9,14 +9,14 @@ import casadi as ca
 import numpy as np
 import numpy.typing as npt
 import pytest
-from hovi.optimize.criteria import Criteria
-from hovi.optimize.ended import Reason
 from scipy.linalg import cho_solve
 from scipy.optimize import linprog, minimize
 
 from hovi.optimize.barrier import Bounds
 from hovi.optimize.bounded_objective import BoundedObjective, BoundedOutcome, Outputs, Refinement
 from hovi.optimize.bounded_steps import LARGER_DENSITY
+from hovi.optimize.criteria import Criteria
+from hovi.optimize.ended import Reason
 from hovi.optimize.interior_point import minimize_bounded
 from hovi.optimize.quadratic_model import Factor, IntervalSum, QuadraticModel
 from hovi.system.deadline import OutOfTimeError

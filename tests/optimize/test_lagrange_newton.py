@@ -8,12 +8,12 @@ from itertools import pairwise
 import casadi as ca
 import numpy as np
 import pytest
-from hovi.optimize.criteria import Criteria
-from hovi.optimize.ended import Iteration, Reason
 from scipy.optimize import minimize
 
 from hovi.optimize.banded_model import BandLayout
 from hovi.optimize.constrained_model import ConstrainedModel, ConstraintRows, EqualityObjective
+from hovi.optimize.criteria import Criteria
+from hovi.optimize.ended import Iteration, Reason
 from hovi.optimize.lagrange_newton import ConstrainedOutcome, minimize_under_equations
 from hovi.optimize.quadratic_model import IntervalSum
 from hovi.optimize.restoration import restore

@@ -8,11 +8,11 @@ import casadi as ca
 import numpy as np
 import numpy.typing as npt
 import pytest
-from hovi.optimize.criteria import Criteria
-from hovi.optimize.ended import Reason
 
 from hovi.optimize.barrier import Bounds
 from hovi.optimize.bounded_objective import BoundedOutcome, Outputs, Refinement
+from hovi.optimize.criteria import Criteria
+from hovi.optimize.ended import Reason
 from hovi.optimize.interior_point import minimize_bounded
 from hovi.optimize.nearby_bounded import ROOM, follow_bounded
 from hovi.system.deadline import OutOfTimeError

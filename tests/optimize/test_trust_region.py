@@ -9,9 +9,9 @@ import casadi as ca
 import numpy as np
 import numpy.typing as npt
 import pytest
+
 from hovi.optimize.criteria import Criteria
 from hovi.optimize.ended import Reason
-
 from hovi.optimize.quadratic_model import Factor, IntervalSum, QuadraticModel
 from hovi.optimize.trust_region import Objective, Outcome, minimize, next_radius, solve_subproblem
 

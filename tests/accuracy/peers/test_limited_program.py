@@ -8,7 +8,6 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 import pytest
-from hovi.optimize.criteria import Criteria
 
 from hovi.accuracy.peers.collocation import Collocation
 from hovi.accuracy.peers.collocation_table import collocation_table, with_points
@@ -20,6 +19,7 @@ from hovi.discrete.guess import cubic
 from hovi.discrete.state import State
 from hovi.dynamics.symbolic_dynamics import casadi_functions
 from hovi.errors import SchemeError
+from hovi.optimize.criteria import Criteria
 from hovi.optimize.interior_point import minimize_bounded
 from hovi.planning.problem.limits import Limits, as_limits
 from hovi.planning.problem.problem import TrajectoryProblem

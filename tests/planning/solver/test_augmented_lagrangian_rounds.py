@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import pinocchio as pin
-from hovi.optimize.criteria import Criteria
 
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import DiscretePath, Grid
 from hovi.discrete.state import State
+from hovi.optimize.criteria import Criteria
 from hovi.optimize.trust_region import Outcome, minimize
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.action_objective import ActionObjective

@@ -9,13 +9,13 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 import pytest
-from hovi.optimize.criteria import Criteria
-from hovi.optimize.ended import Reason
 
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import DiscretePath, Grid
 from hovi.discrete.state import State
 from hovi.effects import Gravity
+from hovi.optimize.criteria import Criteria
+from hovi.optimize.ended import Reason
 from hovi.planning.problem.goals import Via
 from hovi.planning.problem.limits import as_limits
 from hovi.planning.problem.problem import TrajectoryProblem

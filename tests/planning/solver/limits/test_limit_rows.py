@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
-from hovi.optimize.criteria import Criteria
 from scipy.interpolate import BPoly, PPoly
 
 import hovi
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import DiscretePath, Grid
 from hovi.discrete.state import State
+from hovi.optimize.criteria import Criteria
 from hovi.optimize.interior_point import minimize_bounded
 from hovi.planning.problem.limits import Limits, as_limits
 from hovi.planning.problem.problem import TrajectoryProblem

@@ -9,10 +9,10 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 import pytest
-from hovi.optimize.criteria import Criteria
 
 import hovi
 from hovi.discrete.grid import DiscretePath
+from hovi.optimize.criteria import Criteria
 from hovi.planning.clearance.convex_shapes import convex_geometry
 from hovi.planning.clearance.obstacles import Obstacle
 from hovi.planning.problem.limits import as_limits

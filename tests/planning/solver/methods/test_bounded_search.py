@@ -6,8 +6,6 @@ import dataclasses
 
 import numpy as np
 import pytest
-from hovi.optimize.criteria import Criteria
-from hovi.optimize.ended import Reason
 
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import Grid
@@ -15,6 +13,8 @@ from hovi.discrete.state import State
 from hovi.effects import Gravity
 from hovi.optimize.banded_model import BandModel
 from hovi.optimize.bordered_model import EquationModel
+from hovi.optimize.criteria import Criteria
+from hovi.optimize.ended import Reason
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.limits import as_limits
 from hovi.planning.problem.problem import TrajectoryProblem

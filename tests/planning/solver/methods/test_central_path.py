@@ -6,9 +6,9 @@ import dataclasses
 
 import numpy as np
 import pytest
-from hovi.optimize.criteria import Criteria
 
 import hovi
+from hovi.optimize.criteria import Criteria
 from hovi.planning.clearance.clearance import Clearance
 from hovi.planning.problem.limits import as_limits
 from hovi.planning.problem.problem import TrajectoryProblem

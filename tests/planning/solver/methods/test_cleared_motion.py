@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 import pytest
-from hovi.optimize.ended import Reason
 
 import hovi
 from hovi.discrete.trajectory import Trajectory
+from hovi.optimize.ended import Reason
 from hovi.planning.clearance.clearance import Clearance
 from hovi.planning.clearance.distances import Distances
 from hovi.planning.problem.problem import TrajectoryProblem
@@ -40,7 +40,7 @@ def around() -> hovi.Task:
 
 
 def test_distances_hold_at_all_times(around: hovi.Task) -> None:
-    clearance, robot = around.criteria.clearance, around.scene.robot
+    clearance, robot = around.options.clearance, around.scene.robot
     margin = float(clearance.margin)
     free = hovi.plan_task(around, obstacles=[]).trajectory
     assert least_by_coal(free, robot, clearance) < margin - 0.02
@@ -64,8 +64,8 @@ def test_where_no_rough_motion_is_found_the_rounds_find_one(
     monkeypatch.setattr(cleared_motion, "_rough", failing)
     found = hovi.plan_task(around, intervals=16)
     assert found.status in (hovi.Status.MINIMUM, hovi.Status.UNRESOLVED)
-    least = least_by_coal(found.trajectory, around.scene.robot, around.criteria.clearance)
-    assert float(around.criteria.clearance.margin) <= least + 1e-7
+    least = least_by_coal(found.trajectory, around.scene.robot, around.options.clearance)
+    assert float(around.options.clearance.margin) <= least + 1e-7
 
 
 def test_too_few_steps_are_no_proof_that_there_is_no_motion(around: hovi.Task) -> None:
@@ -76,7 +76,7 @@ def test_too_few_steps_are_no_proof_that_there_is_no_motion(around: hovi.Task) -
     for most in (4, 6, 8):
         found = solve_on_grid(problem, "cubic", max_iterations=most, method=rows)
         assert found.status is hovi.Status.ITERATION_LIMIT, found.message
-        robot, clearance = around.scene.robot, around.criteria.clearance
+        robot, clearance = around.scene.robot, around.options.clearance
         least.append(least_by_coal(found.trajectory, robot, clearance))
     assert min(least) < 0.0
 

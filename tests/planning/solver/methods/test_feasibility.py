@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 import pytest
-from hovi.optimize.criteria import Criteria
-from hovi.optimize.ended import Reason
 
 import hovi
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import Grid
 from hovi.optimize.bounded_objective import BoundedOutcome
+from hovi.optimize.criteria import Criteria
+from hovi.optimize.ended import Reason
 from hovi.planning.problem.limit_violation import excess_along
 from hovi.planning.problem.limits import as_limits
 from hovi.planning.problem.problem import TrajectoryProblem

@@ -6,14 +6,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hovi.optimize.criteria import Criteria
-from hovi.optimize.ended import Reason
 
 import hovi
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import Grid
 from hovi.discrete.state import State
 from hovi.discrete.trajectory import Trajectory
+from hovi.optimize.criteria import Criteria
+from hovi.optimize.ended import Reason
 from hovi.optimize.interior_point import minimize_bounded
 from hovi.planning.problem.limits import Limits, as_limits
 from hovi.planning.problem.problem import TrajectoryProblem
@@ -81,14 +81,14 @@ def test_limits_hold_at_ten_thousand_samples(models: Path, name: str) -> None:
         task.start,
         task.goal,
         task.duration,
-        scheme=task.criteria.scheme,
-        intervals=task.criteria.intervals,
-        limits=task.criteria.limits,
+        scheme=task.options.scheme,
+        intervals=task.options.intervals,
+        limits=task.options.limits,
         self_collision=False,
     )
     assert solution.status is Status.MINIMUM, solution.message
     assert solution.n_neg == 0
-    limits = as_limits(task.scene.robot, task.criteria.limits)
+    limits = as_limits(task.scene.robot, task.options.limits)
     assert largest_excess(solution.trajectory, limits) <= limits.tolerance
 
 

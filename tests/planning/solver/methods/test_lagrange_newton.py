@@ -9,9 +9,9 @@ import casadi as ca
 import numpy as np
 import pinocchio as pin
 import pytest
-from hovi.optimize.ended import Iteration
 
 import hovi
+from hovi.optimize.ended import Iteration
 from hovi.planning.solver.methods.augmented_lagrangian import AugmentedLagrangian
 from hovi.planning.solver.methods.lagrange_newton import LagrangeNewton
 from hovi.planning.solver.solver import solve_on_grid

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hovi.optimize.criteria import Criteria
 
 from hovi.discrete.grid import DiscretePath
+from hovi.optimize.criteria import Criteria
 from hovi.planning.problem.limits import as_limits
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.bounded_action import BoundedAction
