@@ -8,14 +8,13 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
+from hovi import Solution, Status, solve
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import Grid
 from hovi.discrete.state import State
 from hovi.errors import InputError
 from hovi.planning.problem.limits import as_limits
 from hovi.planning.problem.problem import TrajectoryProblem
-from hovi.planning.solver.solver import Solution, solve_on_grid
-from hovi.planning.solver.status import Status
 from hovi.scene.scene import Scene
 from hovi.schemes import galerkin
 from samples.joint_lagrangian import JointLagrangian
@@ -46,7 +45,7 @@ class LeastAcceleration(JointLagrangian):
 def solved(scene: Scene, limits: object = None, stiffening: float = 0.0) -> Solution:
     ld = DiscreteLagrangian(LeastAcceleration(scene, stiffening), Grid.uniform(T, 6, galerkin(2)))
     bounds = None if limits is None else as_limits(scene.robot, limits)
-    return solve_on_grid(TrajectoryProblem(ld, State(START), State(GOAL), bounds))
+    return solve(TrajectoryProblem(ld, State(START), State(GOAL), bounds))
 
 
 def test_least_acceleration_is_the_cubic(arm_scene: Scene) -> None:

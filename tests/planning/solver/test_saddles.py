@@ -3,31 +3,26 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 import pytest
 
+from hovi import Solution, Status, solve
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
-from hovi.discrete.grid import DiscretePath, Grid
+from hovi.discrete.grid import Grid
 from hovi.discrete.state import State
 from hovi.effects import Gravity
-from hovi.optimize.criteria import Criteria
-from hovi.optimize.ended import Reason
 from hovi.planning.problem.goals import Via
 from hovi.planning.problem.limits import as_limits
 from hovi.planning.problem.problem import TrajectoryProblem
-from hovi.planning.solver.action_objective import ActionObjective
-from hovi.planning.solver.methods.bounded_search import Bounded, BoundedSearch
-from hovi.planning.solver.methods.interior_point import _searched
-from hovi.planning.solver.solver import Solution, guess_path, solve_on_grid
-from hovi.planning.solver.status import Status
 from hovi.robot.loading import load_robot
 from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
 from hovi.schemes import galerkin
+from oracles.dense_action import DenseAction
 from samples.oscillating_lagrangian import FREE_HORIZONS, HORIZONS, OscillatingLagrangian
 
 Array = npt.NDArray[np.float64]
@@ -72,7 +67,7 @@ def test_a_stationary_motion_has_as_many_negative_eigenvalues_as_conjugate_point
 ) -> None:
     inner_modes = 2 if intervals < 100 else 0
     problem = oscillating(two_link, T, intervals, inner_modes)
-    assert_told(solve_on_grid(problem, escape_saddles=False), index)
+    assert_told(solve(problem, escape_saddles=False), index)
 
 
 @pytest.mark.parametrize(("T", "index"), FREE_HORIZONS.items())
@@ -80,58 +75,41 @@ def test_with_a_free_last_velocity_the_conjugate_points_are_others(
     two_link: Robot, T: float, index: int
 ) -> None:
     problem = oscillating(two_link, T, 24, free_velocity=["elbow"])
-    assert_told(solve_on_grid(problem, escape_saddles=False), index)
+    assert_told(solve(problem, escape_saddles=False), index)
 
 
 @pytest.mark.parametrize("T", [T for T, index in HORIZONS.items() if index > 0])
 def test_a_saddle_is_left_for_lower_costs(two_link: Robot, T: float) -> None:
     """Without limits the cost has no lower bound there, so that no minimum can be found."""
-    found = solve_on_grid(oscillating(two_link, T, 8), max_iterations=30)
+    found = solve(oscillating(two_link, T, 8), max_iterations=30)
     assert not found.success
     assert found.status not in (Status.MINIMUM, Status.SADDLE)
-    assert found.cost < solve_on_grid(oscillating(two_link, T, 8), escape_saddles=False).cost
-
-
-class StopsAnywhere(BoundedSearch):
-    """A search that ends at a given stationary motion and its multipliers, of whatever index."""
-
-    found: Bounded
-
-    def solve(self, path: DiscretePath, start: object = None) -> Bounded:
-        return self.found
-
-
-def stopped(problem: TrajectoryProblem, convex: TrajectoryProblem) -> StopsAnywhere:
-    """A search at the minimum of `convex`, whose first joint moves like that of the problem."""
-    assert problem.limits is not None
-    path = guess_path(problem, "cubic")
-    first = BoundedSearch(convex, problem.limits, Criteria(), None, path)
-    found = first.solve(path)
-    assert found.why is Reason.STATIONARY
-    search = StopsAnywhere(problem, problem.limits, Criteria(), None, path)
-    search.rows = first.rows
-    condensed = found.barrier.condensed(found.outputs.y)
-    found.model = search.objective(None).model(found.x, *condensed)
-    search.found = found
-    return search
+    assert found.cost < solve(oscillating(two_link, T, 8), escape_saddles=False).cost
 
 
 def assert_told_within(problem: TrajectoryProblem, active: bool, index: int) -> None:
-    """Whether a motion that meets the first-order conditions with limits has this index.
+    """Whether a motion that meets the first-order conditions with limits is a minimum or left.
 
-    The joint with limits moves independently of the other and has none.
+    The joint with limits moves independently of the other, which has none; so the minimum of both
+    without the bend of the latter is stationary.
     """
     convex = OscillatingLagrangian(problem.scene, (0.0, 0.0))
-    ld = DiscreteLagrangian(convex, problem.grid)
-    search = stopped(problem, dataclasses.replace(problem, ld=ld))
-    largest = np.abs(search.found.barrier.multipliers).max()
-    assert (largest > 1e-3) == active
-    assert search.negative_eigenvalues(search.found) == index
-    result = _searched(search)
-    assert result.n_neg == index
-    assert result.status is (Status.MINIMUM if index == 0 else Status.SADDLE)
-    words = "a minimum of cost" if index == 0 else f"with {index} directions of negative curvature"
-    assert words in result.message
+    stationary = solve(dataclasses.replace(problem, ld=DiscreteLagrangian(convex, problem.grid)))
+    assert stationary.success
+    assert problem.limits is not None
+    t, most = np.linspace(0.0, problem.grid.duration, 2001), problem.limits.upper[1, 0]
+    fastest = np.abs(stationary.trajectory.sample(t).v[:, 0]).max()
+    assert (fastest > 0.999 * most) == active
+    cost = problem.ld.action(stationary.trajectory.path)
+    motion = stationary.trajectory
+    for guess in (motion, motion.path)[problem.grid.intervals > 1000 :]:
+        found = solve(problem, guess, max_iterations=40 if index == 0 else 12)
+        if index == 0:
+            assert_told(found, 0)
+            assert found.cost == pytest.approx(cost, rel=1e-6)
+        else:
+            assert found.cost < cost - 1.0
+            assert found.success == (found.n_neg == 0)
 
 
 def velocity_limits(T: float, active: bool) -> dict[str, object]:
@@ -143,7 +121,7 @@ def velocity_limits(T: float, active: bool) -> dict[str, object]:
 @pytest.mark.parametrize(
     ("intervals", "active"), [(24, True), (24, False), (1001, True)], ids=["band", "slack", "tree"]
 )
-def test_a_saddle_within_limits_is_no_minimum(
+def test_a_saddle_within_limits_is_left(
     two_link: Robot, T: float, index: int, active: bool, intervals: int
 ) -> None:
     inner_modes = 2 if intervals < 100 else 0
@@ -152,7 +130,7 @@ def test_a_saddle_within_limits_is_no_minimum(
 
 
 @pytest.mark.parametrize(("T", "index"), FREE_HORIZONS.items())
-def test_a_saddle_within_limits_and_with_a_free_end_is_no_minimum(
+def test_a_saddle_within_limits_and_with_a_free_end_is_left(
     two_link: Robot, T: float, index: int
 ) -> None:
     limits = velocity_limits(T, active=True)
@@ -165,7 +143,7 @@ def test_with_limits_a_saddle_is_left_for_a_minimum(two_link: Robot, T: float) -
     """The velocity limit bounds the cost from below, -T v^2/2, nearly reached by each joint."""
     fastest = 10.0
     limits = {"base": "none", "v": [2.4 / T, fastest], "a": 1e3}
-    found = solve_on_grid(oscillating(two_link, T, 12, limits=limits))
+    found = solve(oscillating(two_link, T, 12, limits=limits))
     assert_told(found, 0)
     assert -T * fastest**2 / 2 < found.cost < 0.0
 
@@ -203,47 +181,13 @@ def held_level(kind: str, T: float, **ends: object) -> TrajectoryProblem:
     return TrajectoryProblem(ld, State(level), State(level), **ends)  # type: ignore[arg-type]
 
 
-def dense_hessian(problem: TrajectoryProblem, path: DiscretePath) -> tuple[Array, Array]:
-    """Central differences of the action's gradient, and its tangent map to the nodes.
-
-    The second of shape (nodes, nv, size): the change of q with each unknown.
-    """
-    action = ActionObjective(problem, "band")
-    model = action.model(path, None, None)
-    unit, e = np.eye(len(model.gradient)), 1e-5
-
-    def gradient(step: Array) -> Array:
-        return action.model(action.retract(path, step, model), None, None).gradient
-
-    columns = [(gradient(e * s) - gradient(-e * s)) / (2 * e) for s in unit]
-    difference: Callable[[Array, Array], Array] = problem.robot.difference
-    moves = [difference(path.q, action.retract(path, e * s, model).q) / e for s in unit]
-    H = np.stack(columns, axis=1)
-    return (H + H.T) / 2, np.stack(moves, axis=-1)
-
-
-def null_space(J: Array) -> Array:
-    """A basis of the directions that J maps to zero, shape (size, dimension)."""
-    _, s, V = np.linalg.svd(J)
-    rank = int((s > 1e-8 * s.max(initial=1e-300)).sum())
-    return np.asarray(V[rank:].T)
-
-
-def index_of(H: Array) -> int:
-    """The number of negative eigenvalues, none of which is near zero."""
-    values = np.linalg.eigvalsh(H)
-    assert np.abs(values).min() > 1e-7 * np.abs(values).max()
-    return int((values < 0).sum())
-
-
 @pytest.mark.parametrize(("kind", "T", "index"), CASES)
 def test_a_hold_has_as_many_negative_eigenvalues_as_its_dense_hessian(
     kind: str, T: float, index: int
 ) -> None:
     problem = held_level(kind, T)
-    H, _ = dense_hessian(problem, guess_path(problem, "cubic"))
-    assert index_of(H) == index
-    assert_told(solve_on_grid(problem, escape_saddles=False), index)
+    assert DenseAction(problem, problem.guess("cubic")).index() == index
+    assert_told(solve(problem, escape_saddles=False), index)
 
 
 @pytest.mark.parametrize(
@@ -263,10 +207,9 @@ def test_at_a_via_point_only_motions_through_it_count(kind: str, T: float, index
     """The index is that on the null space of the condition, here of the middle node."""
     level = held_level(kind, T).start
     problem = held_level(kind, T, via=(Via(T / 2, State(level.q)),))
-    H, moves = dense_hessian(problem, guess_path(problem, "cubic"))
-    Z = null_space(moves[2])
-    assert index_of(Z.T @ H @ Z) == index
-    found = solve_on_grid(problem, escape_saddles=False)
+    action = DenseAction(problem, problem.guess("cubic"))
+    assert action.index(held=action.nodes[2, 0]) == index
+    found = solve(problem, escape_saddles=False)
     assert_told(found, index)
     assert "So far" not in found.message  # the via point is met
 
@@ -277,6 +220,5 @@ def test_an_end_with_a_free_velocity_is_stationary_on_that_of_the_dense_hessian(
     free = TrajectoryProblem(
         problem.ld, problem.start, State(problem.goal.q, free_velocity=["all"])
     )
-    found = solve_on_grid(free, escape_saddles=False)
-    H, _ = dense_hessian(free, found.trajectory.path)
-    assert_told(found, index_of(H))
+    found = solve(free, escape_saddles=False)
+    assert_told(found, DenseAction(free, found.trajectory.path).index())

@@ -11,8 +11,6 @@ import pytest
 
 import hovi
 from hovi.errors import InputError, UnreachableError
-from hovi.planning.search.options import PlanOptions
-from hovi.planning.solver.receding.ends import KEPT_OPTIONS
 
 Q = [0.3, -1.2, 1.2, -0.5, 0.3, 0.1]
 HAND = [0.45, 0.25, 0.35]
@@ -113,9 +111,22 @@ def test_a_measured_configuration_without_a_velocity_is_warned_of(planned: hovi.
         planned.advance(0.7)
 
 
-def test_what_motions_planned_again_keep_are_options_of_plan() -> None:
-    known = {*inspect.signature(hovi.plan).parameters, *inspect.signature(PlanOptions).parameters}
-    assert set(KEPT_OPTIONS) <= known
+OWN = {"scene", "start", "goal", "progress", "options", "guess", "time_limit", "strict", "seed"}
+
+
+@pytest.mark.parametrize("method", ["replan", "advance"])
+def test_every_other_option_of_plan_is_kept(planned: hovi.Solution, method: str) -> None:
+    """Or is one of `solve` as well; none of them is unknown."""
+    options = {*inspect.signature(hovi.PlanOptions).parameters, "duration"}
+    kept = options - OWN - {*inspect.signature(hovi.solve).parameters}
+    kept -= {"duration"} if method == "advance" else set()
+    assert {"tolerance", "limits", "via", "obstacles"} < kept
+    call = {"replan": planned.replan, "advance": lambda **given: planned.advance(0.1, **given)}
+    for name in kept:
+        with pytest.raises(
+            InputError, match=f"{method} keeps `{name}` as planned: call plan again"
+        ):
+            call[method](**{name: None})
 
 
 def test_an_option_that_does_not_exist_is_named(planned: hovi.Solution) -> None:
