@@ -18,6 +18,7 @@ import pytest
 
 import hovi
 import hovi.accuracy
+from hovi import PlanOptions
 from hovi.accuracy import Run, Thresholds, work_precision
 from hovi.accuracy.budget import Budget
 from hovi.accuracy.diagram import Diagram
@@ -30,7 +31,6 @@ from hovi.cli.application import main
 from hovi.discrete.state import State
 from hovi.errors import InputError
 from hovi.planning.problem.frame_goal import FrameGoal
-from hovi.planning.search.options import PlanOptions
 from hovi.planning.task_file.reading import load_task
 from hovi.planning.task_file.task import Task
 from hovi.robot.bundled_models import example

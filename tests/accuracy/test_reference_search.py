@@ -6,6 +6,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from hovi import PlanOptions, plan
 from hovi.accuracy.budget import Budget
 from hovi.accuracy.reference_search import Reference, find_reference
 from hovi.accuracy.resolved_motion import LIMIT_TOLERANCE_SHARE
@@ -14,13 +15,11 @@ from hovi.discrete.state import State
 from hovi.effects import Gravity
 from hovi.errors import InputError, UnmeasurableError
 from hovi.planning.problem.limits import TOLERANCE, Limits
-from hovi.planning.search.options import PlanOptions
-from hovi.planning.search.planner import plan
-from hovi.planning.solver.solver import solve_on_grid
 from hovi.planning.task_file.task import Task
 from hovi.robot.loading import load_robot
 from hovi.scene.scene import Scene
 from hovi.schemes import hermite_simpson
+from oracles.on_grid import solve_on_grid
 from samples import paper_arm
 
 PEAKS = np.array([8.04, 8.89])

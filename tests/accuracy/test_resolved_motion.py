@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from hovi import Solution, plan
 from hovi.accuracy.budget import Budget
 from hovi.accuracy.resolved_motion import ResolvedMotion, resolve
 from hovi.errors import UnmeasurableError
-from hovi.planning.search.planner import plan
-from hovi.planning.solver.solver import Solution
 from hovi.planning.task_file.reading import load_task
 from hovi.robot.bundled_models import example
 from hovi.scene.scene import Scene

@@ -7,6 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 
+from hovi import PlanOptions, plan
 from hovi.accuracy import work_precision
 from hovi.accuracy.diagram import Diagram
 from hovi.accuracy.measures import shown_size
@@ -15,8 +16,6 @@ from hovi.accuracy.tables import cheapest_rows
 from hovi.accuracy.tolerance_method import Choice
 from hovi.discrete.state import State
 from hovi.planning.problem.limits import Limits
-from hovi.planning.search.options import PlanOptions
-from hovi.planning.search.planner import plan
 from hovi.planning.task_file.task import Task
 from hovi.scene.scene import Scene
 from samples import paper_arm

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import hovi
+from hovi import Solution
 from hovi.cli.reports.limit_margins import KnownMargins, limit_margins, nearest_pair
 from hovi.planning.clearance.obstacles import Sphere
-from hovi.planning.solver.solver import Solution
 from hovi.system.deadline import Deadline
 from hovi.viewing.recorded_limits import imposed_limits
 

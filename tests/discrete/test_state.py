@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from hovi import plan
 from hovi.cli.application import main
 from hovi.discrete.state import State, warn_of_degrees
 from hovi.errors import HoviWarning
 from hovi.flows.simulator import simulate
 from hovi.planning.problem.goals import Via
-from hovi.planning.search.planner import plan
 from hovi.planning.task_file.reading import load_task
 from hovi.robot.example_robots import BUILT_IN_CODE, example_names
 from hovi.robot.loading import load_robot

@@ -26,11 +26,11 @@ from hovi.discrete.trajectory import Trajectory
 from hovi.effects import Gravity
 from hovi.errors import HoviWarning, InputError, TrajectoryFileError
 from hovi.planning.problem.problem import TrajectoryProblem
-from hovi.planning.solver.solver import solve_on_grid
 from hovi.robot.loading import load_robot
 from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
 from hovi.schemes import by_name, galerkin
+from oracles.on_grid import solve_on_grid
 from samples.cubic_motion import cubic_motion
 
 Array = npt.NDArray[np.float64]

@@ -21,14 +21,13 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from hovi import version
+from hovi import plan, version
 from hovi.dynamics import function_cache as module
 from hovi.dynamics.function_cache import COMPILERS, CompilationError, compiled, library_folder
 from hovi.dynamics.point_function import PointFunction
 from hovi.dynamics.symbolic_dynamics import casadi_functions
 from hovi.dynamics.torque_model import CasadiTorque
 from hovi.effects import Gravity, JointLimitPotential, SceneSymbols
-from hovi.planning.search.planner import plan
 from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
 from hovi.system.deadline import Deadline, OutOfTimeError

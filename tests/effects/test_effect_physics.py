@@ -13,6 +13,7 @@ import pinocchio as pin
 import pytest
 from scipy.integrate import solve_ivp
 
+from hovi import plan
 from hovi.discrete.state import State
 from hovi.effects import (
     AccelerationCost,
@@ -34,7 +35,6 @@ from hovi.effects import (
 )
 from hovi.flows.execution.tracking import play
 from hovi.flows.simulator import simulate
-from hovi.planning.search.planner import plan
 from hovi.robot.loading import load_robot
 from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene

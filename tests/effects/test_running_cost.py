@@ -14,6 +14,7 @@ import pinocchio as pin
 import pytest
 
 import hovi.symbolic
+from hovi import plan
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import Grid
 from hovi.discrete.state import State
@@ -31,13 +32,12 @@ from hovi.effects import (
 )
 from hovi.errors import SceneError
 from hovi.planning.problem.problem import TrajectoryProblem
-from hovi.planning.search.planner import plan
-from hovi.planning.solver.solver import solve_on_grid
 from hovi.robot.loading import load_robot
 from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
 from hovi.schemes import galerkin
 from oracles.ipopt_oracle import least_action
+from oracles.on_grid import solve_on_grid
 
 Array = npt.NDArray[np.float64]
 POINTS = 5

@@ -15,6 +15,7 @@ import pinocchio as pin
 import pytest
 from scipy.integrate import solve_ivp
 
+from hovi import plan
 from hovi.cli.application import main
 from hovi.discrete.state import State
 from hovi.discrete.trajectory import Trajectory
@@ -27,7 +28,6 @@ from hovi.flows.execution.tracking import play
 from hovi.flows.legendre_transforms import highest_derivative, legendre
 from hovi.flows.simulator import simulate
 from hovi.flows.stepper import flow
-from hovi.planning.search.planner import plan
 from hovi.robot.loading import load_robot
 from hovi.robot.mimic_model import Coupling, coupled
 from hovi.robot.robot import Robot

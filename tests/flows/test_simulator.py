@@ -16,13 +16,13 @@ import pinocchio as pin
 import pytest
 from scipy.integrate import solve_ivp
 
+from hovi import plan
 from hovi.cli.application import main
 from hovi.discrete.state import State
 from hovi.discrete.trajectory import Trajectory
 from hovi.effects import Effect, Gravity, SceneSymbols
 from hovi.errors import InputError, SceneError
 from hovi.flows.simulator import simulate
-from hovi.planning.search.planner import plan
 from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
 

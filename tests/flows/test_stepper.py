@@ -18,7 +18,6 @@ from hovi.flows.legendre_transforms import legendre
 from hovi.flows.scheme_lagrangian import SchemeLagrangian
 from hovi.flows.stepper import compensated, flow
 from hovi.planning.problem.problem import TrajectoryProblem
-from hovi.planning.solver.solver import solve_on_grid
 from hovi.robot.robot import Robot
 from hovi.scene.casadi_lagrangian import CasadiLagrangian
 from hovi.scene.effort_lagrangian import EffortLagrangian
@@ -26,6 +25,7 @@ from hovi.scene.lagrangian import Lagrangian
 from hovi.scene.scene import Scene
 from hovi.scene.standard_lagrangians import spline
 from hovi.schemes import by_name, galerkin
+from oracles.on_grid import solve_on_grid
 from samples.long_flows import JET, arm_energy, costless, noether_errors, quartic, quartic_energy
 
 Array = npt.NDArray[np.float64]

@@ -10,12 +10,12 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from hovi import Solution
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import Grid
 from hovi.discrete.state import State
 from hovi.effects import Gravity
 from hovi.planning.problem.problem import TrajectoryProblem
-from hovi.planning.solver.solver import Solution
 from hovi.robot.bundled_models import example
 from hovi.robot.loading import load_robot
 from hovi.robot.urdf.planar_chain import write_chain

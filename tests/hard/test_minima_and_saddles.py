@@ -26,6 +26,7 @@ from hard.scenes import (
     summary,
     uneven,
 )
+from hovi import Solution, Status, plan
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import DiscretePath, Grid
 from hovi.discrete.interval_batch import Coordinates
@@ -34,14 +35,12 @@ from hovi.errors import HoviWarning
 from hovi.optimize.merge_tree import MergeTreeModel
 from hovi.optimize.quadratic_model import IntervalSum
 from hovi.planning.problem.hessian_structure import ActionStructure
-from hovi.planning.search.planner import plan
-from hovi.planning.solver.solver import Solution, solve_on_grid
-from hovi.planning.solver.status import Status
 from hovi.planning.task_file.reading import load_task
 from hovi.robot.bundled_models import example
 from hovi.scene.casadi_lagrangian import CasadiLagrangian
 from hovi.scene.scene import Scene
 from hovi.schemes import galerkin
+from oracles.on_grid import solve_on_grid
 from samples.paper_arm import HANG, REACH_COST
 
 SCHEMES = "taylor-midpoint", "hermite-simpson", "galerkin-0", "galerkin-2"

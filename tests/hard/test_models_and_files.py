@@ -20,11 +20,11 @@ from hard import mutated_mesh, mutated_motion, mutated_scene, mutated_urdf
 from hard.case import Case, Outcome, parameters
 from hard.strange_files import ARM, MASS, by_pinocchio, loaded, long_chain, refusals, run_process
 from hard.verdict import Verdict
+from hovi import plan
 from hovi.discrete.grid import Grid
 from hovi.discrete.trajectory import Trajectory
 from hovi.dynamics.function_cache import compiled, library_folder
 from hovi.effects import Gravity
-from hovi.planning.search.planner import plan
 from hovi.scene.scene import Scene
 from hovi.schemes import galerkin
 

@@ -10,13 +10,13 @@ import pytest
 from hard import naive
 from hard.case import Case, Outcome, at_most, parameters
 from hard.scenes import HANG_JET, REACH, REACH_JET, START, UP, UP_JET, arm, problem, summary
+from hovi import Solution, Status
 from hovi.flows.scheme_lagrangian import SchemeLagrangian
 from hovi.flows.stepper import flow
-from hovi.planning.solver.solver import Solution, solve_on_grid
-from hovi.planning.solver.status import Status
 from hovi.scene.standard_lagrangians import spline
 from hovi.schemes import galerkin
 from laws.test_splines import exact_recursion
+from oracles.on_grid import solve_on_grid
 from samples.long_flows import noether_errors, spline_error
 from samples.paper_arm import HANG, REACH_COST
 

@@ -18,13 +18,13 @@ import pytest
 from hard import naive
 from hard.case import Case, Outcome, parameters
 from hard.scenes import HANG_JET, UP_JET, hanging, links, uneven
+from hovi import plan
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import DiscretePath
 from hovi.errors import HoviError
 from hovi.optimize.criteria import Criteria
 from hovi.optimize.trust_region import minimize
 from hovi.planning.problem.problem import TrajectoryProblem
-from hovi.planning.search.planner import plan
 from hovi.planning.solver.action_objective import ActionObjective
 from hovi.robot.loading import load_robot
 from hovi.robot.robot import Robot

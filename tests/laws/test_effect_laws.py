@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
+from hovi import plan
 from hovi.discrete.state import State
 from hovi.discrete.trajectory import Trajectory
 from hovi.dynamics.symbolic_dynamics import casadi_functions
@@ -30,7 +31,6 @@ from hovi.effects import (
     register,
 )
 from hovi.errors import SceneError
-from hovi.planning.search.planner import plan
 from hovi.planning.task_file.reading import load_task
 from hovi.planning.task_file.task import Task
 from hovi.planning.task_file.writing import save_task

@@ -8,10 +8,9 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from hovi import Solution, plan
 from hovi.dynamics.inverse_dynamics_kernel import joints_without_kernel
 from hovi.effects import Gravity
-from hovi.planning.search.planner import plan
-from hovi.planning.solver.solver import Solution
 from hovi.robot.loading import load_robot
 from hovi.robot.space import joint_kinds
 from hovi.scene.scene import Scene

@@ -11,6 +11,7 @@ import pinocchio as pin
 import pytest
 from typer.testing import CliRunner
 
+from hovi import Solution, certify, plan
 from hovi.cli.application import application
 from hovi.cli.reports.peaks import peaks
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
@@ -24,9 +25,7 @@ from hovi.planning.problem.limit_violation import excess_along
 from hovi.planning.problem.limits import as_limits
 from hovi.planning.problem.node_conditions import JointCondition
 from hovi.planning.problem.problem import TrajectoryProblem
-from hovi.planning.refinement.certificate import certify
-from hovi.planning.search.planner import plan
-from hovi.planning.solver.solver import Solution, guess_path, solve_on_grid
+from hovi.planning.solver.solver import guess_path
 from hovi.planning.task_file.reading import load_task
 from hovi.planning.task_file.task_plan import plan_task
 from hovi.robot.loading import load_robot
@@ -36,6 +35,7 @@ from hovi.scene.scene import Scene
 from hovi.schemes import galerkin
 from hovi.viewing.csv_table import write_csv
 from hovi.viewing.plotting import motion_figure
+from oracles.on_grid import solve_on_grid
 from samples.manifold_robots import configurations, with_arm
 
 Array = npt.NDArray[np.float64]

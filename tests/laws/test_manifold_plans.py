@@ -11,6 +11,7 @@ import pytest
 from scipy.integrate import solve_bvp, solve_ivp
 from scipy.optimize import root
 
+from hovi import Solution, plan
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import Grid
 from hovi.discrete.guess import cubic, path_on_grid, with_turns
@@ -19,12 +20,11 @@ from hovi.discrete.trajectory import Trajectory
 from hovi.effects import Armature, Effect, Gravity
 from hovi.errors import InputError
 from hovi.planning.problem.problem import TrajectoryProblem
-from hovi.planning.search.planner import plan
-from hovi.planning.solver.solver import Solution, solve_on_grid
 from hovi.robot.loading import load_robot
 from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
 from hovi.schemes import by_name, galerkin
+from oracles.on_grid import solve_on_grid
 from samples.manifold_robots import configurations, revolute, rigid_body, with_arm
 
 Array = npt.NDArray[np.float64]

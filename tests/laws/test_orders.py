@@ -13,17 +13,18 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
+from hovi import Solution
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import Grid
 from hovi.discrete.state import State
 from hovi.dynamics.symbolic_dynamics import casadi_functions
 from hovi.effects import Gravity
 from hovi.planning.problem.problem import TrajectoryProblem
-from hovi.planning.solver.solver import Solution, solve_on_grid
 from hovi.robot.bundled_models import example
 from hovi.robot.loading import load_robot
 from hovi.scene.scene import Scene
 from hovi.schemes import by_name
+from oracles.on_grid import solve_on_grid
 from samples.paper_arm import HANG, REACH_Q, REACH_V
 
 Array = npt.NDArray[np.float64]

@@ -11,6 +11,7 @@ import numpy.typing as npt
 import pinocchio as pin
 import pytest
 
+from hovi import PlanOptions, plan
 from hovi.accuracy.effect_study.study import study_effects
 from hovi.cli.application import main
 from hovi.discrete.state import State
@@ -23,8 +24,6 @@ from hovi.planning.clearance.clearance import Clearance
 from hovi.planning.clearance.distances import Distances
 from hovi.planning.clearance.obstacles import Box
 from hovi.planning.problem.limits import urdf_limits
-from hovi.planning.search.options import PlanOptions
-from hovi.planning.search.planner import plan
 from hovi.planning.task_file.reading import load_task
 from hovi.planning.task_file.task import Task
 from hovi.planning.task_file.writing import save_task

@@ -11,9 +11,9 @@ import casadi as ca
 import numpy as np
 import pytest
 
+from hovi import plan
 from hovi.effects import REGISTRY, Effect, Gravity, Payload, ViscousFriction
 from hovi.flows.simulator import simulate
-from hovi.planning.search.planner import plan
 from hovi.planning.task_file.reading import load_task
 from hovi.planning.task_file.task import Task
 from hovi.robot.bundled_models import example

@@ -8,15 +8,14 @@ from typing import Any
 import numpy as np
 import pytest
 
+from hovi import Status, plan
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import DiscretePath
 from hovi.discrete.state import State
 from hovi.planning.clearance.obstacles import Sphere
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.goals import Via
-from hovi.planning.search.planner import plan
 from hovi.planning.solver import action_objective
-from hovi.planning.solver.status import Status
 from hovi.scene.scene import Scene
 from hovi.system.interruption import (
     interrupted,

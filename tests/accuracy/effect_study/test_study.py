@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from hovi import PlanOptions, plan
 from hovi.accuracy.effect_study.candidates import effect_candidates
 from hovi.accuracy.effect_study.study import EffectStudy, study_effects
 from hovi.accuracy.effect_study.tables import (
@@ -24,8 +25,6 @@ from hovi.discrete.state import State
 from hovi.effects import Armature, Drag, Gravity, Payload, VelocityCost, ViscousFriction, Wrench
 from hovi.errors import InputError, SceneError
 from hovi.flows.execution.tracking import play
-from hovi.planning.search.options import PlanOptions
-from hovi.planning.search.planner import plan
 from hovi.planning.task_file.task import Task
 from hovi.robot.loading import load_robot
 from hovi.robot.robot import Robot

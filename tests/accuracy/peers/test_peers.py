@@ -36,10 +36,10 @@ from hovi.effects import Gravity, JointLimitPotential
 from hovi.errors import InputError, SchemeError, UnmeasurableError
 from hovi.planning.problem.limits import Limits
 from hovi.planning.problem.problem import TrajectoryProblem
-from hovi.planning.solver.solver import solve_on_grid
 from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
 from hovi.schemes import galerkin
+from oracles.on_grid import solve_on_grid
 
 Array = npt.NDArray[np.float64]
 

@@ -7,12 +7,12 @@ import numpy.typing as npt
 import pinocchio as pin
 import pytest
 
+from hovi import plan
 from hovi.discrete.measures.motion_error import deviation, relative_difference, sample_points
 from hovi.discrete.state import State
 from hovi.discrete.trajectory import Trajectory
 from hovi.effects import Gravity
 from hovi.errors import InputError
-from hovi.planning.search.planner import plan
 from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
 

@@ -12,6 +12,7 @@ import pinocchio as pin
 import pytest
 from scipy.integrate import solve_ivp
 
+from hovi import certify, plan
 from hovi.cli.application import main
 from hovi.discrete.state import State
 from hovi.discrete.trajectory import Trajectory
@@ -20,8 +21,6 @@ from hovi.errors import InputError
 from hovi.flows.execution.controllers import FEEDBACKS, Controller, OpenLoop, controller
 from hovi.flows.execution.tracking import Tracking, play
 from hovi.flows.simulator import simulate
-from hovi.planning.refinement.certificate import certify
-from hovi.planning.search.planner import plan
 from hovi.planning.task_file.reading import load_task
 from hovi.planning.task_file.task_plan import plan_task
 from hovi.robot.loading import load_robot

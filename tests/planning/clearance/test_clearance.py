@@ -7,6 +7,7 @@ import numpy.typing as npt
 import pytest
 
 import hovi
+from hovi import Status
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import Grid
 from hovi.discrete.trajectory import Trajectory
@@ -19,9 +20,9 @@ from hovi.planning.problem.limits import as_limits
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.bounded_action import BoundedAction
 from hovi.planning.solver.clearance_outputs import ClearanceOutputs
-from hovi.planning.solver.solver import guess_path, solve_on_grid
-from hovi.planning.solver.status import Status
+from hovi.planning.solver.solver import guess_path
 from hovi.schemes import galerkin
+from oracles.on_grid import solve_on_grid
 
 Array = npt.NDArray[np.float64]
 HANG, REACH = [-np.pi / 2, 0.0], [0.3, 0.7]

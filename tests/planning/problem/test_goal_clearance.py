@@ -9,12 +9,12 @@ import pinocchio as pin
 import pytest
 
 import hovi
+from hovi import Status
 from hovi.planning.clearance.clearance import Clearance
 from hovi.planning.clearance.distances import Distances
 from hovi.planning.clearance.obstacles import Box, Capsule, Obstacle, Sphere
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.goal_clearance import goal_distances
-from hovi.planning.solver.status import Status
 from hovi.robot.loading import load_robot
 from hovi.robot.robot import Robot
 

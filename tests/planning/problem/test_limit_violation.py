@@ -7,6 +7,7 @@ import re
 import numpy as np
 import pytest
 
+from hovi import plan
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import Grid
 from hovi.discrete.guess import path_on_grid
@@ -20,7 +21,6 @@ from hovi.planning.problem.limit_violation import (
 )
 from hovi.planning.problem.limits import as_limits
 from hovi.planning.problem.problem import TrajectoryProblem
-from hovi.planning.search.planner import plan
 from hovi.robot.loading import load_robot
 from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene

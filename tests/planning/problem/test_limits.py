@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from hovi import plan
 from hovi.cli.application import main
 from hovi.errors import HoviWarning, InputError
 from hovi.planning.problem.limits import Limits, as_limits, no_limits
-from hovi.planning.search.planner import plan
 from hovi.robot.loading import load_robot
 from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from hovi import Solution, Status, plan
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import Grid
 from hovi.discrete.measures.motion_error import deviation
@@ -17,9 +18,6 @@ from hovi.planning.problem.tolerance import Accuracy, Round, Tolerance
 from hovi.planning.refinement.adaptive import first_grid, refine_to_tolerance, solve_to_tolerance
 from hovi.planning.refinement.candidate import ROUNDING_FLOOR
 from hovi.planning.refinement.error_estimate import FinerSolution, finer_than
-from hovi.planning.search.planner import plan
-from hovi.planning.solver.solver import Solution, solve_on_grid
-from hovi.planning.solver.status import Status
 from hovi.planning.task_file.reading import load_task
 from hovi.planning.task_file.task import Task
 from hovi.robot.bundled_models import example
@@ -27,6 +25,7 @@ from hovi.robot.loading import load_robot
 from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
 from hovi.schemes import galerkin
+from oracles.on_grid import solve_on_grid
 from samples.paper_arm import HANG, REACH_Q, REACH_V
 
 SCENES = ("two_link_reach", "ur5_reach", "panda_reach")

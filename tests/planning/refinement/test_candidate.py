@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
+from hovi import Solution
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import Grid
 from hovi.discrete.measures.motion_error import deviation
@@ -23,9 +24,9 @@ from hovi.planning.refinement.error_estimate import (
     FinerSolution,
     finer_than,
 )
-from hovi.planning.solver.solver import Solution, solve_on_grid
 from hovi.scene.scene import Scene
 from hovi.schemes import by_name
+from oracles.on_grid import solve_on_grid
 from samples.paper_arm import HANG, REACH_Q, REACH_V
 
 REACH = State(REACH_Q, REACH_V)

@@ -10,20 +10,19 @@ import pytest
 from scipy.integrate import quad
 
 import hovi
+from hovi import Solution, certify, estimate_error, plan
 from hovi.cli.reports.certificate import certificate_lines
 from hovi.discrete.curve_integral import integral_along
 from hovi.discrete.state import State
 from hovi.effects import Armature, Custom, Gravity, ViscousFriction, Wrench
 from hovi.errors import InputError
 from hovi.flows.execution.dynamics_replay import replay_dynamics
-from hovi.planning.refinement.certificate import certify, momentum_jump
-from hovi.planning.refinement.error_estimate import estimate_error
+from hovi.planning.refinement.certificate import momentum_jump
 from hovi.planning.refinement.nodal_hamiltonian import nodal_hamiltonian
-from hovi.planning.search.planner import plan
-from hovi.planning.solver.solver import Solution, solve_on_grid
 from hovi.robot.loading import load_robot
 from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
+from oracles.on_grid import solve_on_grid
 from samples.manifold_robots import with_arm
 from samples.paper_arm import HANG, REACH_Q, REACH_V, effort
 

@@ -7,6 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 
+from hovi import Solution, estimate_error
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import MORE_MODES, Grid
 from hovi.discrete.measures.motion_error import (
@@ -20,18 +21,13 @@ from hovi.errors import InputError
 from hovi.planning.problem.limits import Limits
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.refinement.candidate import contributions
-from hovi.planning.refinement.error_estimate import (
-    displaced,
-    estimate_error,
-    finer_than,
-    prolonged,
-)
+from hovi.planning.refinement.error_estimate import displaced, finer_than, prolonged
 from hovi.planning.solver.receding.last_motion import meets
-from hovi.planning.solver.solver import Solution, solve_on_grid
 from hovi.robot.loading import load_robot
 from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
 from hovi.schemes import by_name, galerkin
+from oracles.on_grid import solve_on_grid
 from samples.manifold_robots import BASES, with_arm
 from samples.paper_arm import HANG, REACH_Q, REACH_V, REST, extremal
 

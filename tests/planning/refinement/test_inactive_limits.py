@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from hovi import Solution, Status
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import Grid
 from hovi.discrete.state import State
@@ -16,10 +17,9 @@ from hovi.planning.clearance.obstacles import Sphere
 from hovi.planning.problem.limits import as_limits
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.refinement.inactive_limits import far_from_limits, without_limits
-from hovi.planning.solver.solver import Solution, solve_on_grid
-from hovi.planning.solver.status import Status
 from hovi.scene.scene import Scene
 from hovi.schemes import galerkin
+from oracles.on_grid import solve_on_grid
 from samples.paper_arm import HANG, REACH_Q
 
 FAR_AWAY = Sphere([0.0, 2.8, 0.0], 0.1)

@@ -8,16 +8,17 @@ import numpy as np
 import pytest
 
 import hovi
+from hovi import Solution
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import Grid
 from hovi.discrete.state import State
 from hovi.planning.problem.limits import Limits, as_limits
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.refinement.limit_sensitivity import SHIFT, cost_of_tolerance, limit_prices
-from hovi.planning.solver.solver import Solution, solve_on_grid
 from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
 from hovi.schemes import galerkin
+from oracles.on_grid import solve_on_grid
 
 HANG, GOAL = [-np.pi / 2, 0.0], [0.3, 0.7]
 

@@ -7,6 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 
+from hovi import Solution, Status
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import Grid
 from hovi.discrete.guess import moved
@@ -22,13 +23,12 @@ from hovi.planning.refinement.nearby_minimum import (
     nearby_minimum,
 )
 from hovi.planning.solver.action_objective import ActionObjective
-from hovi.planning.solver.solver import Solution, solve_on_grid
-from hovi.planning.solver.status import Status
 from hovi.planning.task_file.reading import load_task
 from hovi.robot.bundled_models import example
 from hovi.robot.loading import load_robot
 from hovi.scene.scene import Scene
 from hovi.schemes import galerkin
+from oracles.on_grid import solve_on_grid
 from samples.paper_arm import HANG, REACH_Q, REACH_V
 
 UR5_START = [0.0, -1.2, 1.2, -0.5, 0.3, 0.1]

@@ -20,9 +20,9 @@ from hovi.planning.refinement.next_grid import (
     interpolated_to,
     next_grid,
 )
-from hovi.planning.solver.solver import solve_on_grid
 from hovi.scene.scene import Scene
 from hovi.schemes import galerkin
+from oracles.on_grid import solve_on_grid
 from samples.paper_arm import HANG, REACH_Q, REACH_V
 
 STEPS = np.array([0.1, 0.3, 0.2, 0.4])

@@ -11,6 +11,7 @@ import pinocchio as pin
 import pytest
 
 import hovi
+from hovi import Solution, Status
 from hovi.discrete.curve_integral import integral_along
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import Grid
@@ -20,12 +21,11 @@ from hovi.planning.refinement import resolution
 from hovi.planning.refinement.error_estimate import finer_than
 from hovi.planning.refinement.faults.on_curve import RESOLVED
 from hovi.planning.refinement.resolution import FARTHER, GROWTH, NEARBY, resolved
-from hovi.planning.solver.solver import Solution, solve_on_grid
-from hovi.planning.solver.status import Status
 from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
 from hovi.schemes import by_name
 from hovi.system.deadline import Deadline
+from oracles.on_grid import solve_on_grid
 from samples.paper_arm import HANG, REACH_Q
 
 FAST: dict[str, Any] = {"limits": "none", "processes": 1}

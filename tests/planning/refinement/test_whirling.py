@@ -13,7 +13,7 @@ import hovi
 from hovi.planning.problem.tolerance import Tolerance
 from hovi.planning.refinement.error_estimate import finer_than
 from hovi.planning.refinement.whirling import MAX_WHIRLING_ERROR, fault_of_whirling, whirl
-from hovi.planning.solver.solver import solve_on_grid
+from oracles.on_grid import solve_on_grid
 
 UR5_REACH = [1.46, -2.7, 1.45, 1.55, 2.1, -1.61], [2.5, 2.36, 0.25, -0.95, 2.2, 1.59], 3.89
 XARM_REACH = [0.3, -0.6, 0.5, 0.8, 0.2, 0.4, -0.3], [-0.9, 0.4, -0.8, 1.6, 1.2, 1.3, 1.5], 3.0

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import hovi
+from hovi import PlanOptions
 from hovi.errors import UnreachableError
 from hovi.planning.search.branch_choice import chosen_ends
-from hovi.planning.search.options import PlanOptions
 from hovi.robot.robot import Robot
 from hovi.system.deadline import Deadline
 

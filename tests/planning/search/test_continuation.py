@@ -9,21 +9,19 @@ import numpy as np
 import pytest
 
 import hovi
+from hovi import PlanOptions, Solution, Status, plan
 from hovi.discrete.grid import DiscretePath, Grid
 from hovi.discrete.state import State
 from hovi.effects import Gravity
 from hovi.planning.problem.limits import as_limits
 from hovi.planning.search.continuation import may_help, solve_by_continuation
 from hovi.planning.search.job import Job
-from hovi.planning.search.options import PlanOptions
-from hovi.planning.search.planner import plan
 from hovi.planning.solver.action_objective import ActionObjective
-from hovi.planning.solver.solver import Solution, solve_on_grid
-from hovi.planning.solver.status import Status
 from hovi.scene.scene import Scene
 from hovi.schemes import galerkin
 from hovi.system.deadline import Deadline
 from hovi.system.interruption import interrupted, interruptible
+from oracles.on_grid import solve_on_grid
 from samples.paper_arm import HANG, REACH_Q
 from samples.uneven_chain import uneven_chain
 

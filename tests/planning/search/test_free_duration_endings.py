@@ -15,11 +15,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from hovi import Solution, Status
 from hovi.discrete.trajectory import Trajectory
 from hovi.planning.search import free_duration
 from hovi.planning.search.free_duration import FreeDuration, best_duration
-from hovi.planning.solver.solver import Solution
-from hovi.planning.solver.status import Status
 
 FAILURE = re.compile(
     r"infeasible|interrupted|diverged|saddle|limit was reached|the time limit|iteration_limit|"

@@ -9,6 +9,7 @@ from functools import partial
 import numpy as np
 import pytest
 
+from hovi import Solution, Status, plan
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import Grid
 from hovi.discrete.measures.motion_error import deviation
@@ -21,14 +22,12 @@ from hovi.planning.refinement.candidate import Candidate
 from hovi.planning.search import free_to_tolerance as free_to_tolerance_module
 from hovi.planning.search.free_duration import FreeDuration, SolveFor
 from hovi.planning.search.free_to_tolerance import free_to_tolerance
-from hovi.planning.search.planner import plan
-from hovi.planning.solver.solver import Solution, solve_on_grid
-from hovi.planning.solver.status import Status
 from hovi.planning.task_file.reading import load_task
 from hovi.planning.task_file.task import Task
 from hovi.robot.bundled_models import example
 from hovi.scene.scene import Scene
 from hovi.schemes import galerkin
+from oracles.on_grid import solve_on_grid
 from samples.paper_arm import HANG, REACH_Q, REACH_V
 
 BOUNDS = 0.5, 6.0

@@ -8,6 +8,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from hovi import PlanOptions
 from hovi.discrete.grid import Grid
 from hovi.discrete.state import State
 from hovi.effects import Gravity
@@ -22,11 +23,10 @@ from hovi.planning.search.homotopies import (
     other_durations,
 )
 from hovi.planning.search.job import Job
-from hovi.planning.search.options import PlanOptions
-from hovi.planning.solver.solver import solve_on_grid
 from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
 from hovi.schemes import by_name, galerkin
+from oracles.on_grid import solve_on_grid
 from samples.paper_arm import HANG, REACH_Q, REACH_V
 
 POINTS = np.random.default_rng(0).normal(size=(3, 5, 2))

@@ -6,11 +6,11 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from hovi import PlanOptions
 from hovi.discrete.grid import Grid
 from hovi.discrete.state import State
 from hovi.errors import ChartError
 from hovi.planning.search.job import Job, split_for_charts
-from hovi.planning.search.options import PlanOptions
 from hovi.robot.loading import load_robot
 from hovi.scene.scene import Scene
 from hovi.schemes import galerkin

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import hovi
+from hovi import Solution, Status
 from hovi.discrete.grid import Grid
 from hovi.planning.search.free_duration import BestDuration, FreeDuration, SolveFor
 from hovi.planning.search.joint_duration import (
@@ -18,8 +19,7 @@ from hovi.planning.search.joint_duration import (
     joint_minimum,
     unless_best,
 )
-from hovi.planning.solver.solver import Solution, solve_on_grid
-from hovi.planning.solver.status import Status
+from oracles.on_grid import solve_on_grid
 
 SCENES = {
     "two_link_reach": (20.0, (0.5, 4.0), "none"),

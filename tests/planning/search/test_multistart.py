@@ -10,6 +10,7 @@ import pinocchio as pin
 import pytest
 
 import hovi
+from hovi import PlanOptions, Solution, Status
 from hovi.discrete.grid import DiscretePath, Grid
 from hovi.discrete.guess import cubic, path_on_grid, with_bump
 from hovi.discrete.state import State
@@ -26,16 +27,15 @@ from hovi.planning.search.multistart import (
     distinct,
     explore,
 )
-from hovi.planning.search.options import PlanOptions
 from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.methods import interior_point
-from hovi.planning.solver.solver import Solution, guess_path, solve_on_grid
-from hovi.planning.solver.status import Status
+from hovi.planning.solver.solver import guess_path
 from hovi.robot.loading import load_robot
 from hovi.scene.scene import Scene
 from hovi.schemes import by_name
 from hovi.system.deadline import Deadline
 from hovi.workers.pool import end_idle_workers
+from oracles.on_grid import solve_on_grid
 from samples.manifold_robots import chain
 from samples.paper_arm import HANG
 

@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 
 import hovi
+from hovi import PlanOptions
 from hovi.cli.application import main
 from hovi.errors import InputError
 from hovi.planning.clearance.obstacles import Sphere
 from hovi.planning.problem.tolerance import Tolerance
 from hovi.planning.search.job import Job
 from hovi.planning.search.option_fields import option_infos
-from hovi.planning.search.options import PlanOptions
 from hovi.scene.scene import Scene
 from samples.paper_arm import HANG, REACH_Q
 

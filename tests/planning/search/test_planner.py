@@ -8,17 +8,15 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
+from hovi import Solution, Status, plan
 from hovi import plan as public_plan
 from hovi.discrete.grid import Grid
 from hovi.discrete.state import State
 from hovi.effects import Gravity
 from hovi.errors import HoviError, InputError, ModelError, SceneError, SchemeError
 from hovi.planning.search.final_stages import MAX_REFINED
-from hovi.planning.search.planner import plan
 from hovi.planning.search.search import COARSE_INTERVALS
 from hovi.planning.solver.action_objective import ActionObjective
-from hovi.planning.solver.solver import Solution, solve_on_grid
-from hovi.planning.solver.status import Status
 from hovi.planning.task_file.reading import load_task
 from hovi.planning.task_file.task_plan import plan_task
 from hovi.robot.bundled_models import example
@@ -26,6 +24,7 @@ from hovi.robot.loading import load_robot
 from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
 from hovi.schemes import by_name, galerkin, is_galerkin
+from oracles.on_grid import solve_on_grid
 from samples.manifold_robots import half_turning
 from samples.paper_arm import HANG, REACH_COST, REACH_Q, REACH_V
 

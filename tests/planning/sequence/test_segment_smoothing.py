@@ -6,9 +6,9 @@ import numpy as np
 import numpy.typing as npt
 
 import hovi
+from hovi import PlanOptions
 from hovi.effects import Gravity, JerkCost
 from hovi.planning.problem.notation.smoothing import smoothed
-from hovi.planning.search.options import PlanOptions
 from hovi.planning.sequence.segment import Segment
 from hovi.planning.sequence.segment_smoothing import smoothed_durations
 from hovi.planning.sequence.sequence_job import job_of

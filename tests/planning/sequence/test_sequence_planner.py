@@ -15,6 +15,7 @@ import pinocchio as pin
 import pytest
 
 import hovi
+from hovi import PlanOptions
 from hovi.discrete.state import State
 from hovi.errors import HoviError, InputError, SceneError
 from hovi.planning.search.homotopies import (
@@ -25,7 +26,6 @@ from hovi.planning.search.homotopies import (
     other_durations,
 )
 from hovi.planning.search.job import Job
-from hovi.planning.search.options import PlanOptions
 from hovi.planning.sequence.branches import Leg, chosen_branches
 from hovi.planning.sequence.segment import Segment
 from hovi.planning.sequence.sequence_job import job_of

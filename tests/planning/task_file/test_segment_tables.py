@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import hovi
+from hovi import PlanOptions
 from hovi.errors import InputError, SceneError
-from hovi.planning.search.options import PlanOptions
 from hovi.planning.task_file.reading import load_task
 from hovi.planning.task_file.task import Task
 from hovi.planning.task_file.task_plan import plan_task

@@ -15,12 +15,12 @@ import pinocchio as pin
 import pytest
 
 import hovi.effects
+from hovi import PlanOptions
 from hovi.discrete.state import State
 from hovi.errors import HoviError, InputError, ModelError, SceneError, SchemeError
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.limits import as_limits
 from hovi.planning.problem.tolerance import Quantity, Tolerance
-from hovi.planning.search.options import PlanOptions
 from hovi.planning.task_file.reading import load_task
 from hovi.planning.task_file.writing import save_task
 from hovi.robot.bundled_models import example, example_scenes

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from hovi import plan
 from hovi.errors import ModelError
 from hovi.planning.clearance.obstacles import Sphere
-from hovi.planning.search.planner import plan
 from hovi.robot.loading import load_robot
 from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene

@@ -14,8 +14,8 @@ from typing import Any
 import pinocchio as pin
 import pytest
 
+from hovi import plan
 from hovi.errors import StudyError
-from hovi.planning.search.planner import plan
 from hovi.planning.task_file.reading import load_task
 from hovi.robot.bundled_models import example
 from hovi.study.running import runner
