@@ -16,7 +16,6 @@ time that the slowest joint needs at its velocity limit. A success is denied if
 from __future__ import annotations
 
 import argparse
-import re
 import sys
 import time
 from collections import Counter
@@ -24,36 +23,19 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
-import pinocchio as pin
 from measuring import print_machine, print_table
+from outside_judge import MAX_DIFFERENCE, MAX_EXCESS, excess, integral, oracle_model, torques
+from twelve_arms import ARMS, load, reaches
 
 import hovi
 from hovi.planning.solver.solver import solve_on_grid
 from hovi.schemes import galerkin
 
-ALL_BUT_FINGERS = r"(?!.*(finger|[Gg]ripper)).*"
-ARMS = {
-    **dict.fromkeys(
-        ("ur5", "ur10", "panda", "z1", "xarm7", "kinova", "talos_arm"), ALL_BUT_FINGERS
-    ),
-    "so100": r"(shoulder|elbow|wrist)_.*",
-    "bravo7_no_ee": ALL_BUT_FINGERS,
-    "tiago": r"arm_\d_joint",
-    "baxter": r"left_[swe]\d",
-    "alex_nub_hands": r"Left(?!Gripper).*",
-}
-"""Robots of example-robot-data, with a pattern of the joints that move; all others are locked."""
-HOLDING_SHARE = 0.9
-"""Largest torque that holds a start or goal, as a share of its limit."""
 TIME_LIMIT = 600.0
 COMMON = {"self_collision": False, "time_limit": TIME_LIMIT, "processes": 1}
 """Time limit of a plan, in [s]."""
-MAX_DIFFERENCE = 1e-2
-"""Largest relative difference of costs of a success that is not denied."""
-MAX_EXCESS = 2e-6
-"""Largest accepted excess over a limit, as a share of its range: twice hovi's own tolerance."""
-GAUSS_POINTS, SAMPLES = 48, 50_001
-"""Points per interval of the integral, and times at which limits are checked."""
+SAMPLES = 50_001
+"""Times at which limits are checked."""
 
 
 @dataclass(frozen=True)
@@ -75,91 +57,26 @@ class Reach:
     message: str
 
 
-def load(arm: str) -> hovi.Scene:
-    """The arm under gravity, with all other joints locked."""
-    names = list(hovi.load_robot(arm).model.names)[1:]
-    locked = [name for name in names if not re.fullmatch(ARMS[arm], name)]
-    return hovi.Scene(hovi.load_robot(arm, locked=locked), effects=[hovi.effects.Gravity()])
-
-
-def reaches(scene: hovi.Scene, count: int, seed: int) -> list[tuple[np.ndarray, np.ndarray, float]]:
-    """Start, goal and duration of every reach."""
-    robot = scene.robot
-    rng, found = np.random.default_rng(seed), []
-    while len(found) < count:
-        start, goal = (_draw(robot, rng) for _ in range(2))
-        slowness = rng.uniform(1.5, 3.0)
-        torque = np.abs(_holding_torque(scene, np.array([start, goal])))
-        if (torque <= HOLDING_SHARE * robot.effort_limit).all():
-            distance = np.abs(robot.difference(start, goal))
-            T = slowness * np.max(distance / np.clip(robot.velocity_limit, 0.1, 10.0))
-            found.append((start, goal, float(T)))
-    return found
-
-
-def _draw(robot: hovi.Robot, rng: np.random.Generator) -> np.ndarray:
-    """A configuration within +-pi of the neutral one and within the limits."""
-    model = robot.model
-    angle = np.empty(model.nv)
-    for joint in model.joints[1:]:
-        bounds = model.lowerPositionLimit[joint.idx_q], model.upperPositionLimit[joint.idx_q]
-        low, high = bounds if joint.nq == 1 else (-np.pi, np.pi)
-        angle[joint.idx_v] = rng.uniform(max(low, -np.pi), min(high, np.pi))
-    return np.asarray(pin.integrate(model, pin.neutral(model), angle))
-
-
-def _holding_torque(scene: hovi.Scene, q: np.ndarray) -> np.ndarray:
-    zero = np.zeros((len(q), scene.robot.nv))
-    return scene.inverse_dynamics(q, zero, zero)
-
-
-def oracle_model(scene: hovi.Scene) -> pin.Model:
-    """The robot's model with the scene's gravity and armature, for pin.rnea."""
-    model = scene.robot.model.copy()
-    model.gravity.linear = np.array([0.0, 0.0, -9.81])
-    model.armature = np.zeros(model.nv)
-    return model
-
-
-def torques(model: pin.Model, motion: object) -> np.ndarray:
-    """Torques of pin.rnea at samples of q, v and a, shape (M, nv), in [N m]."""
-    data = model.createData()
-    rows = zip(motion.q, motion.v, motion.a, strict=True)
-    return np.array([pin.rnea(model, data, *row) for row in rows])
-
-
-def integral(scene: hovi.Scene, trajectory: hovi.Trajectory) -> float:
-    """1/2 integral |tau|^2 along the curve."""
-    x, w = np.polynomial.legendre.leggauss(GAUSS_POINTS)
-    t, h = np.asarray(trajectory.t), np.diff(trajectory.t)[:, None]
-    tau = torques(oracle_model(scene), trajectory.sample((t[:-1, None] + h * (x + 1) / 2).ravel()))
-    return float(np.sum((h * w / 2).ravel() * 0.5 * np.sum(tau**2, axis=1)))
-
-
-def excess(scene: hovi.Scene, trajectory: hovi.Trajectory) -> float:
+def beyond_limits(scene: hovi.Scene, trajectory: hovi.Trajectory) -> float:
     """Largest excess over a limit, as a share of its range; unlimited joints are left out."""
     robot = scene.robot
     motion = trajectory.sample(np.linspace(0.0, trajectory.duration, SAMPLES))
+    tau = torques(oracle_model(robot.model), motion)
     bounds = [
         (motion.v, -robot.velocity_limit, robot.velocity_limit),
-        (torques(oracle_model(scene), motion), -robot.effort_limit, robot.effort_limit),
+        (tau, -robot.effort_limit, robot.effort_limit),
     ]
     if robot.vector_joints:
         bounds.append((motion.q, robot.lower, robot.upper))
-    worst = 0.0
-    for y, low, high in bounds:
-        limited = np.isfinite(low) & np.isfinite(high) & (high > low) & (high - low < 1e6)
-        outside = np.maximum(y - high, low - y)[:, limited] / (high - low)[limited]
-        worst = max(worst, float(outside.max(initial=0.0)))
-    return worst
+    return max(0.0, *(excess(*each) for each in bounds))
 
 
 def denial(scene: hovi.Scene, limits: str, plan: hovi.Solution) -> str:
     """Why a success is denied, or ""."""
-    difference = integral(scene, plan.trajectory) / plan.cost - 1
+    difference = integral(oracle_model(scene.robot.model), plan.trajectory) / plan.cost - 1
     if abs(difference) > MAX_DIFFERENCE:
         return f"integral {difference:+.1e}"
-    beyond = excess(scene, plan.trajectory) if limits == "urdf" else 0.0
+    beyond = beyond_limits(scene, plan.trajectory) if limits == "urdf" else 0.0
     if beyond > MAX_EXCESS:
         return f"limits {beyond:.1e}"
     grid = plan.trajectory.grid

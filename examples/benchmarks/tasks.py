@@ -29,7 +29,6 @@ from measuring import compile_modules, print_machine, print_table
 from task_world import least_clearance, read_world
 
 import hovi
-from hovi.planning.problem.limits import as_limits
 from hovi.robot.bundled_models import task_suite
 from hovi.robot.example_robots import example_robot
 
@@ -105,7 +104,7 @@ def requests(scene: Path, known: dict[str, Any] | None) -> list[dict[str, Any]]:
     robot, options = task.scene.robot, task.options
     if options.grasped:
         robot = hovi.holding(robot, options.grasped)
-    limits = as_limits(robot, options.limits)
+    limits = hovi.as_limits(robot, options.limits)
     if known is not None and known["success"]:
         ends = [known["ends"]]
     else:

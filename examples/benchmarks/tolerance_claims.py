@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from measuring import print_machine, print_table
-from resolved_reaches import load, reaches
+from twelve_arms import load, reaches
 
 import hovi
 from hovi.planning.solver.solver import solve_on_grid
