@@ -21,9 +21,10 @@ from hovi.discrete.state import State
 from hovi.discrete.trajectory import Trajectory
 from hovi.effects import Armature, Gravity
 from hovi.errors import ChartError, InputError, SceneError
+from hovi.planning.conditions.function import linear
+from hovi.planning.conditions.state_difference import StateDifference
 from hovi.planning.problem.limit_violation import excess_along
 from hovi.planning.problem.limits import as_limits
-from hovi.planning.problem.node_conditions import JointCondition
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.solver import guess_path
 from hovi.planning.task_file.reading import load_task
@@ -196,11 +197,11 @@ def test_second_derivatives_of_a_joint_condition_match_finite_differences() -> N
     robot = load_robot(with_arm("free-flyer"))
     q, target = configurations(robot, 2, 5)
     v, n = np.zeros(robot.nv), robot.nv
-    condition = JointCondition(robot, target, v, np.ones((2, n), dtype=bool))
-    _, J = condition.evaluate(q, v)
+    error = StateDifference(robot, target, v, np.ones((2, n), dtype=bool))
+    _, J = linear(error, q, v)
     h = 1e-5
     for i, e in enumerate(np.eye(n)):
-        there, back = (condition.evaluate(robot.integrate(q, s * h * e), v)[0] for s in (1, -1))
+        there, back = (linear(error, robot.integrate(q, s * h * e), v)[0] for s in (1, -1))
         np.testing.assert_allclose(J[:, 0, i], (there - back) / (2 * h), atol=1e-8)
 
 

@@ -37,6 +37,7 @@ INSIDE = {
     "planning": [
         {"obstacles"},
         {"clearance"},
+        {"conditions"},
         {"problem"},
         {"paths"},
         {"solver"},

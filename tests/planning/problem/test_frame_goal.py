@@ -8,9 +8,10 @@ import pytest
 
 import hovi
 from hovi.errors import InputError
+from hovi.planning.conditions.function import Function, bend, linear
+from hovi.planning.conditions.state_difference import StateDifference
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.inverse_kinematics import nearest_configuration
-from hovi.planning.problem.node_conditions import Condition, JointCondition
 from hovi.robot.robot import Robot
 from oracles.finite_differences import derivative
 
@@ -42,16 +43,14 @@ KINDS = ("pose", "matrix", "position", "rotation", "axis", "position and axis")
 def test_the_equations_of_a_goal_have_exact_derivatives(panda: Robot, kind: str) -> None:
     random = np.random.default_rng(1)
     target, q = random.uniform(-1, 1, (2, 7))
-    condition = goals(panda, "panda_hand", target)[kind].condition(panda)
-    v, weights = np.zeros(7), random.standard_normal(condition.size)
-    c, J = condition.evaluate(q, v)
-    assert c.shape == (condition.size,)
-    np.testing.assert_allclose(
-        J[:, 0], derivative(lambda x: condition.evaluate(x, v)[0], q), atol=1e-9
-    )
+    error = goals(panda, "panda_hand", target)[kind].difference(panda)
+    v, weights = np.zeros(7), random.standard_normal(error.size)
+    c, J = linear(error, q, v)
+    assert c.shape == (error.size,)
+    np.testing.assert_allclose(J[:, 0], derivative(lambda x: linear(error, x, v)[0], q), atol=1e-9)
     assert not J[:, 1].any()
-    slope = derivative(lambda x: weights @ condition.evaluate(x, v)[1][:, 0], q)
-    np.testing.assert_allclose(condition.curvature(q, v, weights)[0, :, 0], slope, atol=1e-9)
+    slope = derivative(lambda x: weights @ linear(error, x, v)[1][:, 0], q)
+    np.testing.assert_allclose(bend(error, q, v, weights)[0, :, 0], slope, atol=1e-9)
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -80,15 +79,15 @@ def test_the_derivatives_are_taken_along_the_configuration_space() -> None:
     q = robot.integrate(robot.neutral(), random.uniform(-1, 1, robot.nv))
     target = robot.integrate(q, random.uniform(-0.5, 0.5, robot.nv))
     v, held = np.zeros(robot.nv), np.ones((2, robot.nv), dtype=bool)
-    for condition in (
-        goals(robot, robot.tip_frame, target)["pose"].condition(robot),
-        JointCondition(robot, target, v, held),
+    for error in (
+        goals(robot, robot.tip_frame, target)["pose"].difference(robot),
+        StateDifference(robot, target, v, held),
     ):
-        weights = random.standard_normal(condition.size)
-        J = condition.evaluate(q, v)[1][:, 0]
+        weights = random.standard_normal(error.size)
+        J = linear(error, q, v)[1][:, 0]
 
-        def moved(d: np.ndarray, condition: Condition = condition) -> np.ndarray:
-            return condition.evaluate(robot.integrate(q, d), v)[0]
+        def moved(d: np.ndarray, error: Function = error) -> np.ndarray:
+            return linear(error, robot.integrate(q, d), v)[0]
 
         np.testing.assert_allclose(J, derivative(moved, np.zeros(robot.nv)), atol=1e-9)
         slope = derivative(
@@ -97,7 +96,7 @@ def test_the_derivatives_are_taken_along_the_configuration_space() -> None:
             ),
             np.zeros(robot.nv),
         )
-        curvature = condition.curvature(q, v, weights)[0, :, 0]
+        curvature = bend(error, q, v, weights)[0, :, 0]
         np.testing.assert_allclose(curvature, slope, atol=1e-6)
 
 
@@ -115,10 +114,10 @@ def test_half_a_turn_away_does_not_count_as_met(ur5: Robot) -> None:
     """The sines of the rotation error vanish there, too."""
     pose = placement(ur5, "tool0", np.array([0.3, -1.0, 1.2, -0.4, 0.5, 0.2]))
     turned = pose.rotation @ np.diag([1.0, -1.0, -1.0])
-    condition = FrameGoal("tool0", rotation=turned).condition(ur5)
+    goal = FrameGoal("tool0", rotation=turned)
     q = np.array([0.3, -1.0, 1.2, -0.4, 0.5, 0.2])
-    assert np.max(np.abs(condition.evaluate(q, np.zeros(6))[0])) < 1e-12
-    assert condition.pose_error(q)[1] == pytest.approx(np.pi)
+    assert np.max(np.abs(linear(goal.difference(ur5), q, np.zeros(6))[0])) < 1e-12
+    assert goal.miss(ur5, q)[1] == pytest.approx(np.pi)
 
 
 def test_bad_goals_are_refused_in_one_sentence(ur5: Robot) -> None:

@@ -322,7 +322,7 @@ def test_via_points_stay_at_their_times_on_other_grids(arm_scene: hovi.Scene) ->
     problem = hovi.TrajectoryProblem(ld, hovi.State([0, 0]), hovi.State([0.5, 0.5]), via=vias)
     finer = grid.halved(np.array([True, False, True, True]))
     for other in (finer, grid.enriched(2), finer.halved(np.ones(7, dtype=bool))):
-        times = [other.t[each.node] for each in problem.on(other).conditions]
+        times = [other.t[each.where.node] for each in problem.on(other).equations]
         assert times == pytest.approx([0.25, 0.75], abs=1e-14)
 
 

@@ -6,10 +6,10 @@ import numpy as np
 
 from hovi.discrete.state import Periodic
 from hovi.planning.clearance.clearance_violation import less_than_margin
+from hovi.planning.conditions.state_difference import StateDifference
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.goal_clearance import goal_in_obstacle
 from hovi.planning.problem.limits import Limits
-from hovi.planning.problem.node_conditions import JointCondition
 from hovi.planning.problem.presolve.end_torques import unavoidable_torque
 from hovi.planning.problem.presolve.legs import Stop, states_too_far_apart
 from hovi.planning.problem.problem import TrajectoryProblem
@@ -47,9 +47,9 @@ def _via_leaves(problem: TrajectoryProblem, limits: Limits) -> str:
     """Which via point is outside the limits, or leads or came from outside; "" if none does."""
     on, T = problem.coordinates, problem.grid.duration
     scene = problem.scene if problem.about_robot else None
-    for each in problem.conditions:
-        via, t = each.condition, float(problem.grid.t[each.node])
-        if not isinstance(via, JointCondition) or limits.parts:  # of both where segments meet
+    for each in problem.equations:
+        via, t = each.function, each.where.time
+        if not isinstance(via, StateDifference) or limits.parts:  # of both where segments meet
             continue
         jet, window = (via.target, via.velocity), limits.window * T
         state = EndState.of(on, limits, jet, via.held, T, window, scene, t)

@@ -20,8 +20,8 @@ from hovi.checks.shapes import numbers_of
 from hovi.dynamics.point_function import PointFunction
 from hovi.dynamics.symbolic_dynamics import casadi_functions
 from hovi.errors import InputError, nearest
+from hovi.planning.conditions.function import Curvature, Function, Points, Slopes
 from hovi.planning.problem.kinematics.orientation import ORIENTATIONS, rotation_from
-from hovi.planning.problem.node_conditions import Condition
 from hovi.robot.robot import Robot
 from hovi.robot.space.tangent import Symbols, hessian, jacobian
 from hovi.system.dataclass import dataclass
@@ -141,10 +141,10 @@ class FrameGoal:
         """Raise InputError for a frame that the robot does not have, or that no joint moves."""
         robot.check_frame_moves(self.frame)
 
-    def condition(self, robot: Robot) -> FrameCondition:
-        """The goal as a condition c(q) = 0."""
+    def difference(self, robot: Robot) -> PoseDifference:
+        """The goal as a function c(q) that vanishes where it is met."""
         self.check(robot)
-        return FrameCondition(self, robot)
+        return PoseDifference(self, robot)
 
     @property
     def directions(self) -> tuple[Array, Array] | None:
@@ -182,44 +182,46 @@ class FrameGoal:
 
 
 @dataclass(frozen=True, eq=False)
-class FrameCondition(Condition):
+class PoseDifference(Function):
     """The equations of a frame goal: position - target, then the sine of the rotation error.
 
     A rotation error by theta about a unit axis u gives sin(theta) u = sum_i R_i x R*_i / 2 over
     the columns; an axis gives its two components orthogonal to the target. Both also vanish at
-    half a turn, which `pose_error` detects.
+    half a turn, which `is_spurious` detects.
     """
 
     goal: FrameGoal
     robot: Robot
 
     @property
+    def needs(self) -> frozenset[str]:
+        """The configuration alone."""
+        return frozenset({"q"})
+
+    @property
     def size(self) -> int:
         """Number of equations."""
         return self.goal.equations
 
-    def evaluate(self, q: Array, v: Array) -> tuple[Array, Array]:
-        """c and its Jacobian, which are not to be changed."""
-        return self._linear_at(np.asarray(q, dtype=np.float64).tobytes())
+    def values(self, at: Points) -> Array:
+        """c, shape (P, size)."""
+        return np.stack([self._linear_at(q.tobytes())[0] for q in at.q])
 
-    def curvature(self, q: Array, v: Array, weights: Array) -> Array:
+    def slopes(self, at: Points) -> Slopes:
+        """The Jacobian of c in q."""
+        return {"q": np.stack([self._linear_at(q.tobytes())[1] for q in at.q])}
+
+    def curvature(self, at: Points, weights: Array) -> Curvature:
         """sum_i weights_i d2 c_i."""
-        n = self.robot.nv
-        curvature = np.zeros((2, n, 2, n))
-        curvature[0, :, 0] = self._curvature(np.asarray(q)[None], np.asarray(weights)[None])[0][0]
-        return curvature
+        return {("q", "q"): self._curvature(at.q, weights)[0]}
 
-    def pose_error(self, q: Array) -> tuple[float, float]:
-        """Distance in [m] and angle in [rad] from the goal; 0 for parts that it leaves free."""
-        return self.goal.miss(self.robot, q)
-
-    def is_spurious(self, q: Array, v: Array) -> bool:
+    def is_spurious(self, at: Points) -> bool:
         """Whether the frame is half a turn away from its goal."""
-        return self.pose_error(q)[1] > MAX_ANGLE_ERROR
+        return self.goal.miss(self.robot, at.q[0])[1] > MAX_ANGLE_ERROR
 
-    def describe(self, q: Array, v: Array) -> str:
+    def describe(self, at: Points, missed: Array) -> str:
         """The distance and the angle by which the frame misses its goal."""
-        return self.goal.miss_in_words(self.robot, q)
+        return self.goal.miss_in_words(self.robot, at.q[0])
 
     @cached_property
     def _linear_at(self) -> Callable[[bytes], tuple[Array, Array]]:
@@ -227,10 +229,7 @@ class FrameCondition(Condition):
 
         def evaluated(numbers: bytes) -> tuple[Array, Array]:
             c, J = self._linear(np.frombuffer(numbers)[None])
-            jacobian = np.zeros((self.size, 2, self.robot.nv))
-            jacobian[:, 0] = J.reshape(self.size, -1)
-            c.flags.writeable = jacobian.flags.writeable = False
-            return c[0], jacobian
+            return c[0], J.reshape(self.size, -1)
 
         return lru_cache(maxsize=KEPT)(evaluated)
 

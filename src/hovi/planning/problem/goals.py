@@ -12,13 +12,14 @@ from hovi.checks.arguments import check_arguments_except
 from hovi.checks.shapes import numbers_of
 from hovi.discrete.state import ALL, State
 from hovi.errors import InputError
+from hovi.planning.conditions.function import Function, linear
+from hovi.planning.conditions.state_difference import StateDifference
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.inverse_kinematics import (
     InverseKinematicsResult,
     nearest_configuration,
 )
 from hovi.planning.problem.limits import Limits
-from hovi.planning.problem.node_conditions import Condition, JointCondition
 from hovi.planning.problem.presolve.frame_hints import hint_on_frame
 from hovi.planning.problem.units import seconds
 from hovi.robot.robot import Robot
@@ -75,10 +76,10 @@ def _is_given(value: object) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class GoalState:
-    """A state that meets a goal, the equations of the goal, and why it cannot be met, or ""."""
+    """A state that meets a goal, what vanishes where it is met, and why it cannot be, or ""."""
 
     state: State
-    conditions: tuple[Condition, ...] = ()
+    differences: tuple[Function, ...] = ()
     reason: str = ""
 
 
@@ -104,7 +105,7 @@ def goal_state(
         raise InputError(f"the {name} must be a State or a FrameGoal, got {type(goal).__name__}.")
     if not isinstance(coordinates, Robot):
         raise InputError(f"the {name} must be a State: {coordinates.owner} has no frames.")
-    condition = _condition(coordinates, goal)  # which checks the frame
+    difference = _difference(coordinates, goal)  # which checks the frame
     reached = _solved_inverse_kinematics(coordinates, goal, near.tobytes(), limits)
     moving = _moving_joints(coordinates, goal.frame, tuple(free))
     state = State(reached.q, free=moving, free_velocity=tuple(goal.free_velocity))
@@ -113,7 +114,7 @@ def goal_state(
         f"no configuration that reaches the {name} was found: at the nearest, {reached.reason}; "
         f"{hint_on_frame(coordinates, goal) or advice}"
     )
-    return GoalState(state, (condition,), reason)
+    return GoalState(state, (difference,), reason)
 
 
 def held_goal(goal: FrameGoal, robot: Robot, q: Array, free: Sequence[str] = ()) -> State | None:
@@ -131,7 +132,7 @@ def held_goal(goal: FrameGoal, robot: Robot, q: Array, free: Sequence[str] = ())
 def is_isolated(goal: FrameGoal, robot: Robot, q: Array) -> bool:
     """Whether q, (nq,), alone satisfies a goal nearby: the goal's Jacobian has full column rank."""
     moves = moves_frame(robot.model, goal.frame)
-    J = _condition(robot, goal).evaluate(q, np.zeros(robot.nv))[1][:, 0, moves]
+    J = linear(_difference(robot, goal), q, np.zeros(robot.nv))[1][:, 0, moves]
     return bool(np.linalg.matrix_rank(J, tol=FULL_RANK * np.linalg.norm(J)) == moves.sum())
 
 
@@ -144,20 +145,20 @@ def _moving_joints(robot: Robot, frame: str, free: tuple[str, ...]) -> tuple[str
     return tuple(dict.fromkeys((*own, *free)))
 
 
-def via_conditions(via: Via, reached: GoalState, coordinates: Coordinates) -> tuple[Condition, ...]:
-    """The equations of a via point. reached: a state that meets its goal."""
-    if reached.conditions:
-        return reached.conditions
+def via_differences(via: Via, reached: GoalState, coordinates: Coordinates) -> tuple[Function, ...]:
+    """What vanishes at a via point. reached: a state that meets its goal."""
+    if reached.differences:
+        return reached.differences
     q, v = reached.state.on(coordinates, "via")
     held = ~reached.state.free_on(coordinates, "via")
     held[1] &= reached.state.v is not None
-    return (JointCondition(coordinates, q, v, held),)
+    return (StateDifference(coordinates, q, v, held),)
 
 
 @lru_cache(maxsize=256)
-def _condition(robot: Robot, goal: FrameGoal) -> Condition:
-    """The condition of a goal, cached; robots and goals are immutable."""
-    return goal.condition(robot)
+def _difference(robot: Robot, goal: FrameGoal) -> Function:
+    """The difference from a goal, cached; robots and goals are immutable."""
+    return goal.difference(robot)
 
 
 @lru_cache(maxsize=256)

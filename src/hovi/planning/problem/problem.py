@@ -24,12 +24,12 @@ from hovi.errors import InputError
 from hovi.planning.clearance.clearance import Clearance
 from hovi.planning.clearance.distances import Distances
 from hovi.planning.clearance.within_reach import distances_within_reach, with_gaps
+from hovi.planning.conditions.condition import Equation, equation
 from hovi.planning.problem.conserved_momentum import free_fall_contradiction, without_redundancy
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.goals import Via, goal_state
 from hovi.planning.problem.hessian_structure import ActionStructure
 from hovi.planning.problem.limits import Limits, no_limits
-from hovi.planning.problem.node_conditions import NodeCondition
 from hovi.planning.problem.notation.goal_turns import turns_to
 from hovi.planning.problem.notation.summaries import ProblemSummary
 from hovi.planning.problem.notation.supported import require_dynamics, require_supported
@@ -68,7 +68,7 @@ class TrajectoryProblem(ProblemSummary):
     end_jets: (q, q', ..., q^(k-1)) of the two ends for orders k other than 2, k arrays of two rows.
     free_ends: which of (q, q', ..., q^(k-1)) are free at the start and at the goal, shape
         (2, k, nv).
-    conditions: equations at nodes. holds: what is fixed where segments meet.
+    equations: at nodes. holds: what is fixed where segments meet.
     unreachable: why the goal cannot be met, or "".
     turns: full turns of the guess beyond the shortest path, rotation vectors over 2 pi, (nv,).
     Raises InputError, ModelError or SchemeError if the input defines no problem.
@@ -84,7 +84,7 @@ class TrajectoryProblem(ProblemSummary):
     boundary: Boundary = field(init=False, repr=False)
     end_jets: tuple[Array, ...] = field(init=False, repr=False)
     free_ends: Mask = field(init=False, repr=False)
-    conditions: tuple[NodeCondition, ...] = field(init=False, repr=False)
+    equations: tuple[Equation, ...] = field(init=False, repr=False)
     holds: tuple[Hold, ...] = field(init=False, repr=False)
     unreachable: str = field(init=False, repr=False)
     turns: Array = field(init=False, repr=False)
@@ -114,9 +114,10 @@ class TrajectoryProblem(ProblemSummary):
         near = passed.holds[-1].q if passed.holds else start[0]
         free = (*first.free, *(joint for scene in self.scenes for joint in scene.passive))
         end = goal_state(last, "goal", coordinates, near, at_end, free)
-        conditions = [NodeCondition(self.grid.intervals, each) for each in end.conditions]
+        last_node = self.grid.intervals, float(self.grid.t[-1])
+        equations = [equation(each, *last_node) for each in end.differences]
         unreachable = end.reason or passed.reason
-        object.__setattr__(self, "conditions", (*conditions, *passed.conditions))
+        object.__setattr__(self, "equations", (*equations, *passed.equations))
         object.__setattr__(self, "holds", passed.holds)
         self._set_ends(first, end.state, start)
         if self.about_robot and not self.periodic:
@@ -199,7 +200,7 @@ class TrajectoryProblem(ProblemSummary):
 
     def _with(self, ld: DiscreteLagrangian) -> TrajectoryProblem:
         grid, T = ld.grid, self.grid.duration
-        if self.conditions or self.holds or abs(grid.duration - T) > 1e-12 * T:
+        if self.equations or self.holds or abs(grid.duration - T) > 1e-12 * T:
             return dataclasses.replace(self, ld=ld)
         for scheme, _ in grid.groups:
             require_regular(scheme)
@@ -324,7 +325,7 @@ class TrajectoryProblem(ProblemSummary):
     @property
     def constrained(self) -> bool:
         """Whether there are equality constraints: conditions at nodes or passive joints."""
-        return bool(self.conditions) or len(self.passive) > 0
+        return bool(self.equations) or len(self.passive) > 0
 
     @property
     def plain(self) -> bool:

@@ -13,9 +13,9 @@ from hovi.discrete.grid import DiscretePath, Grid
 from hovi.discrete.guess import Curve, joined, named_curve
 from hovi.discrete.interval_paths import path_of_order, regularized_nodes
 from hovi.discrete.path_of_any_order import hermite
-from hovi.planning.problem.goals import Via, goal_state, via_conditions
+from hovi.planning.conditions.condition import Equation, equation
+from hovi.planning.problem.goals import Via, goal_state, via_differences
 from hovi.planning.problem.limits import Limits
-from hovi.planning.problem.node_conditions import NodeCondition
 from hovi.robot.space.coordinates import Coordinates
 from hovi.system.dataclass import dataclass
 
@@ -55,11 +55,11 @@ class Hold:
 class ViaPoints:
     """What the via points of a problem ask for.
 
-    conditions: equations at nodes. holds: of seams, by ascending time. reason: why one of them
+    equations: at nodes. holds: of seams, by ascending time. reason: why one of them
     cannot be met, or "".
     """
 
-    conditions: tuple[NodeCondition, ...]
+    equations: tuple[Equation, ...]
     holds: tuple[Hold, ...]
     reason: str
 
@@ -77,7 +77,7 @@ class ViaPoints:
         near: the first seed of inverse kinematics, shape (nq,); that of a seam is the configuration
             at the last one.
         """
-        conditions: list[NodeCondition] = []
+        equations: list[Equation] = []
         holds: list[Hold] = []
         reason = ""
         for each in sorted(via, key=lambda each: isinstance(each, Seam) * each.time):
@@ -85,14 +85,14 @@ class ViaPoints:
             seed = holds[-1].q if holds else near
             bounds = None if limits is None else limits.until(each.time)
             reached = goal_state(each.goal, name, coordinates, seed, bounds)
-            wanted = via_conditions(each, reached, coordinates)
+            wanted = via_differences(each, reached, coordinates)
             if isinstance(each, Seam):
-                wanted = reached.conditions
+                wanted = reached.differences
                 fixed = ~reached.state.free_on(coordinates, "via")
                 holds.append(Hold(node, each.time, *reached.state.on(coordinates, "via"), fixed))
-            conditions += [NodeCondition(node, condition) for condition in wanted]
+            equations += [equation(each, node, float(grid.t[node])) for each in wanted]
             reason = reason or getattr(each, "unreachable", "") or reached.reason
-        return cls(tuple(conditions), tuple(holds), reason)
+        return cls(tuple(equations), tuple(holds), reason)
 
 
 def holding(path: DiscretePath, grid: Grid, holds: Sequence[Hold]) -> DiscretePath:

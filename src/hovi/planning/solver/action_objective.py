@@ -26,6 +26,7 @@ from hovi.optimize.bordered_model import EquationModel
 from hovi.optimize.merge_tree import MergeTreeModel
 from hovi.optimize.quadratic_model import IntervalSum, QuadraticModel
 from hovi.optimize.trust_region import Objective
+from hovi.planning.conditions.condition import bend_at, linear_at
 from hovi.planning.problem.hessian_structure import ActionStructure
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.multipliers import Multipliers, Residuals, node_residuals
@@ -276,12 +277,12 @@ class ActionObjective(Objective[DiscretePath]):
     def _add_conditions(self, x: DiscretePath, expansion: Expansion, known: Multipliers) -> None:
         """Add the terms of the conditions to the intervals that contain their nodes."""
         rho = known.node_penalty
-        for each, mu in zip(self.problem.conditions, known.nodes, strict=True):
-            k, columns, scale = self._place(each.node)
-            q, v = x.q[each.node], x.v[each.node]
-            c, J = each.condition.evaluate(q, v)  # (s,), (s, 2, n)
+        for each, mu in zip(self.problem.equations, known.nodes, strict=True):
+            k, columns, scale = self._place(each.where.node)
+            q, v = each.where.state(x)
+            c, J = linear_at(each, q, v)  # (s,), (s, 2, n)
             force, flat = mu + rho * c, J.reshape(len(c), -1)
-            curvature = each.condition.curvature(q, v, force)
+            curvature = bend_at(each, q, v, force)
             curvature += rho * (flat.T @ flat).reshape(curvature.shape)
             expansion.gradient[k, columns] += (force @ flat).reshape(2, -1) * scale[:, None]
             curvature *= scale[:, None, None, None] * scale[:, None]
@@ -291,9 +292,9 @@ class ActionObjective(Objective[DiscretePath]):
         """A model at x whose Newton steps meet the conditions at nodes to first order."""
         assert self.multipliers is not None
         rows, residuals = [], []
-        for each in self.problem.conditions:
-            k, columns, scale = self._place(each.node)
-            c, J = each.condition.evaluate(x.q[each.node], x.v[each.node])
+        for each in self.problem.equations:
+            k, columns, scale = self._place(each.where.node)
+            c, J = linear_at(each, *each.where.state(x))
             local = np.zeros(model.intervals.gradient.shape)
             for slope in J:
                 local[k, columns] = slope * scale[:, None]

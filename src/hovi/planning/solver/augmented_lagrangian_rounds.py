@@ -9,6 +9,7 @@ import numpy as np
 
 from hovi.discrete.grid import DiscretePath
 from hovi.optimize.ended import Reason
+from hovi.planning.conditions.condition import describe, is_spurious
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.multipliers import Multipliers, Residuals
@@ -158,20 +159,18 @@ def _at_maximum_penalty(now: Multipliers, first: Multipliers, slow: list[bool]) 
 
 def spurious_sentence(problem: TrajectoryProblem, path: DiscretePath) -> str:
     """Which condition holds at a spurious root, as a sentence without its end; "" if none does."""
-    for each in problem.conditions:
-        q, v = path.q[each.node], path.v[each.node]
-        if each.condition.is_spurious(q, v):
+    for each in problem.equations:
+        if is_spurious(each, path):
             return (
-                f"the frame is half a turn away from its goal at t = "
-                f"{problem.grid.t[each.node]:.4g} s: {each.condition.describe(q, v)}; try another "
-                "initial guess"
+                f"the frame is half a turn away from its goal at t = {each.where.time:.4g} s: "
+                f"{describe(each, path)}; try another initial guess"
             )
     return ""
 
 
 def unmet_sentence(problem: TrajectoryProblem, path: DiscretePath, residuals: Residuals) -> str:
     """As `missed_clause`, a sentence without its end that says what to do."""
-    if residuals.torque_share > FEASIBLE_RESIDUAL or not problem.conditions:
+    if residuals.torque_share > FEASIBLE_RESIDUAL or not problem.equations:
         return (
             f"no motion was found with zero torque at passive joint {_passive(problem)}: the "
             f"remaining torque is {residuals.torque_share:.3g} of the largest; allow more time or "
@@ -186,7 +185,7 @@ def unmet_sentence(problem: TrajectoryProblem, path: DiscretePath, residuals: Re
 
 def missed_clause(problem: TrajectoryProblem, path: DiscretePath, residuals: Residuals) -> str:
     """Passive torques if they are too large, else the goal that is missed most, as a clause."""
-    if residuals.torque_share > FEASIBLE_RESIDUAL or not problem.conditions:
+    if residuals.torque_share > FEASIBLE_RESIDUAL or not problem.equations:
         share = residuals.torque_share
         return f"the torque at passive joint {_passive(problem)} is {share:.3g} of the largest"
     t, error = _worst_condition(problem, path, residuals)
@@ -203,8 +202,7 @@ def _worst_condition(
 ) -> tuple[float, str]:
     """The time in [s] of the condition with the largest residual, and by how much it is missed."""
     worst = max(
-        zip(problem.conditions, residuals.nodes, strict=True),
+        zip(problem.equations, residuals.nodes, strict=True),
         key=lambda pair: float(np.max(np.abs(pair[1]), initial=0.0)),
     )[0]
-    error = worst.condition.describe(path.q[worst.node], path.v[worst.node])
-    return float(problem.grid.t[worst.node]), error
+    return worst.where.time, describe(worst, path)

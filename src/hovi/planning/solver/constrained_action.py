@@ -17,6 +17,7 @@ from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import DiscretePath
 from hovi.optimize.constrained_model import ConstrainedModel, ConstraintRows, EqualityObjective
 from hovi.optimize.quadratic_model import IntervalSum
+from hovi.planning.conditions.condition import bend_at, linear_at
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.problem.torque_moments import TorqueMoments
 from hovi.planning.solver.action_objective import ActionObjective
@@ -56,7 +57,7 @@ class ConstrainedAction(EqualityObjective[DiscretePath]):
 
     def _first_node_penalty(self, path: DiscretePath) -> float:
         """The penalty of conditions, from the cost of a path or the curvature there."""
-        if not self.problem.conditions:
+        if not self.problem.equations:
             return self.penalty
         cost = abs(self.problem.ld.action(path))
         expansion = _expand(self.problem.ld, path, "nodal", None, None, self.action.jets(path))
@@ -106,15 +107,16 @@ class ConstrainedAction(EqualityObjective[DiscretePath]):
     ) -> list[ConstraintRows]:
         """The rows of conditions at nodes; adds their terms to the intervals at their nodes."""
         N, rows = self.problem.grid.intervals, []
-        for each, mu in zip(self.problem.conditions, nodes, strict=True):
-            k = min(each.node, N - 1)
-            first = 0 if each.node < N else self.problem.ld.k
+        for each, mu in zip(self.problem.equations, nodes, strict=True):
+            node = each.where.node
+            k = min(node, N - 1)
+            first = 0 if node < N else self.problem.ld.k
             columns = slice(first, first + 2)
-            q, v = x.q[each.node], x.v[each.node]
-            _, J = each.condition.evaluate(q, v)  # (s, 2, n)
+            q, v = each.where.state(x)
+            _, J = linear_at(each, q, v)  # (s, 2, n)
             scale = np.array([1.0, 1.0 / self.problem.grid.steps[k]])[:, None]  # of (q, h v)
             J = J * scale
-            curvature = each.condition.curvature(q, v, mu) * scale[:, :, None, None] * scale
+            curvature = bend_at(each, q, v, mu) * scale[:, :, None, None] * scale
             expansion.hessian[k, columns, columns] += curvature.transpose(0, 2, 1, 3)
             slopes = np.zeros((1, len(J), first + 2, J.shape[2]))
             slopes[0, :, columns] = self.node_scale * J
@@ -141,8 +143,8 @@ class ConstrainedAction(EqualityObjective[DiscretePath]):
                 last = first + self.moments.size(i)
                 torque.append(self.moments.spread(y[first:last], i))
                 first = last
-        for each in self.problem.conditions:
-            last = first + each.condition.size
+        for each in self.problem.equations:
+            last = first + each.function.size
             nodes.append(self.node_scale * y[first:last])
             first = last
         return torque, nodes

@@ -18,6 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.discrete.grid import DiscretePath
+from hovi.planning.conditions.condition import residual
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.scene.lagrangian import PointTerms
 from hovi.system.dataclass import dataclass
@@ -73,7 +74,7 @@ class Multipliers:
         lagrangian = problem.ld.lagrangian
         outputs = len(lagrangian.output_weight)
         torque = [np.zeros((len(t), outputs)) for t in problem.ld.point_times]
-        nodes = [np.zeros(each.condition.size) for each in problem.conditions]
+        nodes = [np.zeros(each.function.size) for each in problem.equations]
         jet_size = (lagrangian.order + 1) * lagrangian.nv
         return cls(torque, nodes, torque_penalty, node_penalty, jet_size)
 
@@ -116,6 +117,4 @@ class Multipliers:
 
 def node_residuals(problem: TrajectoryProblem, x: DiscretePath) -> list[Array]:
     """c of every condition at a path."""
-    return [
-        each.condition.evaluate(x.q[each.node], x.v[each.node])[0] for each in problem.conditions
-    ]
+    return [residual(each, x) for each in problem.equations]

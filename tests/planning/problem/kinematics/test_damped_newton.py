@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 import hovi
-from hovi.planning.problem.frame_goal import FrameCondition
+from hovi.planning.conditions.function import Points
+from hovi.planning.problem.frame_goal import PoseDifference
 from hovi.planning.problem.kinematics.damped_newton import candidates, seeds
 from hovi.robot.robot import Robot
 
@@ -37,20 +38,20 @@ def test_seeds_begin_nearby_and_cover_the_ranges(ur5: Robot, limited: bool) -> N
 
 
 @dataclass(frozen=True, eq=False)
-class Recorded(FrameCondition):
+class Recorded(PoseDifference):
     """Keeps every configuration at which it is evaluated."""
 
     tried: list[np.ndarray] = field(default_factory=list)
 
-    def evaluate(self, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        self.tried.append(q.copy())
-        return super().evaluate(q, v)
+    def values(self, at: Points) -> np.ndarray:
+        self.tried.append(at.q[0].copy())
+        return super().values(at)
 
 
 class RecordedGoal(hovi.FrameGoal):
-    """A goal whose condition is the same object each time."""
+    """A goal whose difference is the same object each time."""
 
-    def condition(self, robot: Robot) -> FrameCondition:
+    def difference(self, robot: Robot) -> PoseDifference:
         return self.__dict__.setdefault("recorded", Recorded(self, robot))
 
 
@@ -58,7 +59,7 @@ def test_no_step_moves_a_joint_by_more_than_half_a_radian(ur5: Robot) -> None:
     """Each configuration is a seed, or that near to one before it."""
     goal, near = RecordedGoal("tool0", position=[-0.4, 0.3, 0.2]), np.full(6, 0.3)
     assert len([*itertools.islice(candidates(ur5, goal, near, *FREE), 4)]) == 4
-    tried = goal.condition(ur5).tried
+    tried = goal.difference(ur5).tried
     known = [*seeds(ur5, near, *FREE)]
     steps = 0
     for i, q in enumerate(tried):

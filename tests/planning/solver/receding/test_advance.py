@@ -200,8 +200,8 @@ def test_goals_of_frames_are_met(scene: Scene) -> None:
     assert found.success, found.message
     rest = found.advance(0.1, pushed(found, 0.1))
     assert rest.success, rest.message
-    goal = rest.problem.goal.condition(scene.robot)  # type: ignore[union-attr]
-    assert goal.pose_error(rest.trajectory.q[-1])[0] < 1e-8
+    miss = rest.problem.goal.miss(scene.robot, rest.trajectory.q[-1])  # type: ignore[union-attr]
+    assert miss[0] < 1e-8
 
 
 def test_the_estimate_of_a_resolved_motion_is_kept_for_its_rest(free: Solution) -> None:

@@ -118,12 +118,11 @@ def _in_python(
     robot: Robot, goal: FrameGoal, near: Array, bounds: tuple[Array, Array], most: int, seeds: int
 ) -> Branches:
     """The same without the compiled search."""
-    condition = goal.condition(robot)
     apart = ISOLATED if robot.nv <= goal.equations else IN_A_FAMILY
     found: list[Array] = []
     best, least, since = near, np.inf, 0
     for q in itertools.islice(candidates(robot, goal, near, *bounds), seeds):
-        error, since = sum(condition.pose_error(q)), since + 1
+        error, since = sum(goal.miss(robot, q)), since + 1
         if error < least:
             best, least = q, error
         if error <= PYTHON_TOLERANCE and _is_new(robot, q, found, apart):

@@ -11,7 +11,8 @@ from collections.abc import Iterator
 import numpy as np
 import numpy.typing as npt
 
-from hovi.planning.problem.frame_goal import FrameCondition, FrameGoal
+from hovi.planning.conditions.function import linear
+from hovi.planning.problem.frame_goal import FrameGoal, PoseDifference
 from hovi.robot.robot import Robot
 from hovi.system.deadline import raise_if_late
 
@@ -39,10 +40,10 @@ def candidates(
     near: the first seed, shape (nq,).
     lower, upper: position limits, shape (nv,), applied to joints whose q is a plain number.
     """
-    condition = goal.condition(robot)
+    difference = goal.difference(robot)
     for seed in seeds(robot, near, lower, upper):
         raise_if_late()
-        yield _newton(robot, condition, inside(robot, seed, lower, upper), lower, upper)
+        yield _newton(robot, difference, inside(robot, seed, lower, upper), lower, upper)
 
 
 def seeds(robot: Robot, near: Array, lower: Array, upper: Array) -> Iterator[Array]:
@@ -66,10 +67,10 @@ def inside(robot: Robot, q: Array, lower: Array, upper: Array) -> Array:
     return clipped
 
 
-def _newton(robot: Robot, condition: FrameCondition, q: Array, lower: Array, upper: Array) -> Array:
+def _newton(robot: Robot, off: PoseDifference, q: Array, lower: Array, upper: Array) -> Array:
     """Levenberg-Marquardt steps, clipped to the limits."""
     v = np.zeros(robot.nv)
-    c, J = condition.evaluate(q, v)
+    c, J = linear(off, q, v)
     damping, stalled = 1e-2, 0
     for _ in range(MAX_ITERATIONS):
         if np.max(np.abs(c)) <= RESIDUAL_TOLERANCE:
@@ -78,7 +79,7 @@ def _newton(robot: Robot, condition: FrameCondition, q: Array, lower: Array, upp
         step = -A.T @ np.linalg.solve(A @ A.T + damping * np.eye(len(c)), c)
         step *= min(1.0, MAX_STEP / max(float(np.max(np.abs(step))), 1e-300))
         candidate = inside(robot, robot.integrate(q, step), lower, upper)
-        new, slope = condition.evaluate(candidate, v)
+        new, slope = linear(off, candidate, v)
         share = np.linalg.norm(new) / np.linalg.norm(c)
         if share < 1.0:
             q, c, J = candidate, new, slope

@@ -17,6 +17,7 @@ from hovi.discrete.grid import DiscretePath
 from hovi.discrete.guess import Curve, stretched
 from hovi.discrete.state import State
 from hovi.planning.clearance.distances import Distances
+from hovi.planning.conditions.condition import linear_at
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.system.dataclass import dataclass
 
@@ -106,11 +107,11 @@ class _Deformation:
         """Matrix and right-hand side of the acceleration's change and of what holds at nodes."""
         H, g = self._stiffness.copy(), np.zeros(c.size)
         grid, path = self.problem.grid, self.path
-        for each in self.problem.conditions:
-            k, T = each.node, grid.duration
+        for each in self.problem.equations:
+            k, T = each.where.node, grid.duration
             w, dw, _, _ = (x[0] for x in self.waves(grid.t[[k]] / T))
             q, v = self.problem.coordinates.integrate(path.q[k], w @ c), path.v[k] + dw @ c / T
-            value, slope = each.condition.evaluate(q, v)
+            value, slope = linear_at(each, q, v)
             row = w[:, None] * slope[:, :1] + dw[:, None] / T * slope[:, 1:]
             row = row.reshape(len(value), -1)
             H += CONDITION_STIFFNESS * row.T @ row

@@ -46,7 +46,7 @@ be no motion strictly within the limits."""
 
 def is_near(goal: FrameGoal, problem: TrajectoryProblem, path: DiscretePath) -> bool:
     """Whether the end of a path is near a frame goal, whose equations also hold at half a turn."""
-    distance, angle = goal.condition(problem.robot).pose_error(path.q[-1])
+    distance, angle = goal.miss(problem.robot, path.q[-1])
     return distance <= NEAR_DISTANCE and angle <= NEAR_ANGLE
 
 

@@ -86,7 +86,7 @@ def misses(problem: TrajectoryProblem, path: DiscretePath) -> str:
     """How far the ends of a path are from the problem's, as a clause; "" if they are the same."""
     parts = [_miss(problem, path, 0, "starts")]
     if isinstance(problem.goal, FrameGoal):
-        distance, angle = problem.goal.condition(problem.robot).pose_error(path.q[-1])
+        distance, angle = problem.goal.miss(problem.robot, path.q[-1])
         if max(distance, angle) > MET:
             parts.append(f"ends {distance:.3g} m and {angle:.3g} rad from the goal of its frame")
     elif not isinstance(problem.goal, Periodic):

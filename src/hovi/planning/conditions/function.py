@@ -1,0 +1,112 @@
+"""Functions of a motion at one instant, with exact derivatives in the tangent space."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi.system.dataclass import dataclass
+
+Array = npt.NDArray[np.float64]
+Slopes = Mapping[str, Array]
+"""dy / dx for each x of "q", "v", "a" and "tau" that y depends on, shape (P, size, nv)."""
+Curvature = Mapping[tuple[str, str], Array]
+"""sum_i w_i d2 y_i / dx dx' by (x, x'), shape (P, nv, nv), without the transposed (x', x) of two
+different ones; what is left out is zero."""
+ARGUMENTS = "q", "v", "a", "tau", "t"
+"""What a function may depend on."""
+
+
+@dataclass(frozen=True, eq=False)
+class Points:
+    """A motion at P instants.
+
+    q: configurations, shape (P, nq). v: velocities, (P, nv). t: times, (P,), in [s]. a, tau:
+    accelerations and joint torques, (P, nv); None where no function needs them.
+    """
+
+    q: Array
+    v: Array
+    t: Array
+    a: Array | None = None
+    tau: Array | None = None
+
+    def argument(self, name: str) -> Array:
+        """One of ARGUMENTS as a matrix with a row per instant."""
+        found = getattr(self, name)
+        assert found is not None
+        return np.asarray(found.reshape(len(self.q), -1))
+
+
+class Function(ABC):
+    """y of (q, v, a, tau, t) at one instant.
+
+    Derivatives in q are along `integrate`, and those in the others at fixed tau: whoever needs them
+    along a motion adds what comes through tau(q, v, a, t).
+    """
+
+    @property
+    @abstractmethod
+    def needs(self) -> frozenset[str]:
+        """What it depends on, of ARGUMENTS."""
+
+    @property
+    @abstractmethod
+    def size(self) -> int:
+        """Number of entries of y."""
+
+    @abstractmethod
+    def values(self, at: Points) -> Array:
+        """y, shape (P, size)."""
+
+    @abstractmethod
+    def slopes(self, at: Points) -> Slopes:
+        """First derivatives: see Slopes."""
+
+    def curvature(self, at: Points, weights: Array) -> Curvature:
+        """Weighted second derivatives, see Curvature; weights: shape (P, size). None by default."""
+        return {}
+
+    def is_spurious(self, at: Points) -> bool:
+        """Whether y has its value at a root where what is meant does not hold."""
+        return False
+
+    def describe(self, at: Points, missed: Array) -> str:
+        """By how much y misses its value at one instant, as a clause; missed: shape (size,)."""
+        entry = int(np.argmax(np.abs(missed)))
+        return f"its entry {entry} misses it by {abs(missed[entry]):.3g}"
+
+
+STATE = "q", "v"
+"""What a function of a state depends on, in the order of its derivatives."""
+
+
+def linear(function: Function, q: Array, v: Array, t: float = 0.0) -> tuple[Array, Array]:
+    """y at a state, shape (k,), and its Jacobian in (q, v), shape (k, 2, nv).
+
+    q: shape (nq,). v: shape (nv,).
+    """
+    at, J = at_state(q, v, t), np.zeros((function.size, 2, len(v)))
+    for name, slope in function.slopes(at).items():
+        J[:, STATE.index(name)] = slope[0]
+    return function.values(at)[0], J
+
+
+def bend(function: Function, q: Array, v: Array, weights: Array, t: float = 0.0) -> Array:
+    """sum_i weights_i d2 y_i at a state, shape (2, nv, 2, nv); arguments as for `linear`."""
+    n = len(v)
+    total = np.zeros((2, n, 2, n))
+    for (x, y), block in function.curvature(at_state(q, v, t), np.asarray(weights)[None]).items():
+        i, j = STATE.index(x), STATE.index(y)
+        total[i, :, j] += block[0]
+        if i != j:
+            total[j, :, i] += block[0].T
+    return total
+
+
+def at_state(q: Array, v: Array, t: float = 0.0) -> Points:
+    """One instant of a state."""
+    return Points(np.asarray(q)[None], np.asarray(v)[None], np.array([t]))

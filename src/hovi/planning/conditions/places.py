@@ -1,0 +1,73 @@
+"""Where along a motion a condition holds."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi.checks.shapes import numbers_of
+from hovi.discrete.grid import DiscretePath
+from hovi.errors import InputError
+from hovi.system.dataclass import dataclass
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class AtNode:
+    """At one node of a grid, where a condition is a function of q and v.
+
+    node: its index. time: in [s].
+    """
+
+    node: int
+    time: float
+
+    def state(self, x: DiscretePath) -> tuple[Array, Array]:
+        """q (nq,) and v (nv,) of a path there."""
+        return x.q[self.node], x.v[self.node]
+
+
+@dataclass(frozen=True, eq=False)
+class AtTimes:
+    """At given times, which become nodes of every grid.
+
+    times: one or more, positive, in [s].
+    Raises InputError for anything else.
+    """
+
+    times: npt.ArrayLike
+
+    def __post_init__(self) -> None:
+        times = np.atleast_1d(numbers_of("the times of an AtTimes", self.times))
+        if times.ndim > 1 or times.size == 0 or not (np.isfinite(times) & (times > 0)).all():
+            raise InputError(f"an AtTimes needs positive times in [s], got {self.times!r}.")
+        object.__setattr__(self, "times", times)
+
+
+@dataclass(frozen=True)
+class AtPoints:
+    """At all times: bounds at the quadrature points, tightened where they do not hold between."""
+
+
+@dataclass(frozen=True)
+class ControlPoints:
+    """At all times: bounds on the control points of polynomials, which no value exceeds."""
+
+
+@dataclass(frozen=True)
+class Exchange:
+    """At all times: bounds at the instants at which pairs come near, which are looked for."""
+
+
+@dataclass(frozen=True)
+class Along:
+    """At all times: as many moments of an interval vanish as its curve has coefficients."""
+
+
+@dataclass(frozen=True)
+class AtEnds:
+    """At the start and at the goal."""
+
+
+Where = AtNode | AtTimes | AtPoints | ControlPoints | Exchange | Along | AtEnds
