@@ -76,10 +76,10 @@ def ipopt_solve(
     guess: Curve | None = None,
 ) -> IpoptRun:
     """Ipopt on a problem on a uniform grid with a Galerkin table, by default from the cubic."""
-    boundary, T, limits = problem.boundary, problem.grid.duration, problem.limits
+    ends, T, limits = problem.ends, problem.grid.duration, problem.limits
     assert limits is not None
     collocation = _collocation(problem, samples)
-    w = collocation.unknowns(guess or cubic(problem.robot, boundary, T), boundary)
+    w = collocation.unknowns(guess or cubic(problem.robot, ends, T), ends)
     free = np.where(collocation.fixed[:, None], 0.0, np.inf)
     program = LimitedProgram(collocation.program, limits.lower, limits.upper)
     solver, bounds = program.solver(kernels), program.bounds

@@ -44,7 +44,7 @@ def angles(scene: Scene, q: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
 def test_the_near_guess_turns_as_often_as_the_motion(turns: int) -> None:
     scene = Scene(load_robot(chain([pin.JointModelRUBX(), pin.JointModelRUBY()])), [])
     problem = problem_of(scene)
-    plain = cubic(scene.robot, problem.boundary, T)
+    plain = cubic(scene.robot, problem.ends, T)
     motion = with_turns(plain, scene.robot, T, np.array([0.0, float(turns)]))
     q, v, _ = near(problem, motion)(TIMES)
     whole = np.subtract(GOAL, START) + np.array([0.0, 2 * np.pi * turns])
@@ -57,7 +57,7 @@ def test_the_near_guess_turns_as_often_as_the_motion(turns: int) -> None:
 def test_the_near_guess_follows_a_motion_that_is_beyond_half_a_turn_on_its_way() -> None:
     scene = Scene(load_robot(chain([pin.JointModelRUBX(), pin.JointModelRUBY()])), [])
     problem = problem_of(scene)
-    plain = cubic(scene.robot, problem.boundary, T)
+    plain = cubic(scene.robot, problem.ends, T)
 
     def motion(t: npt.NDArray[np.float64]) -> tuple[npt.NDArray[np.float64], ...]:
         q, v, a = plain(t)
@@ -78,7 +78,7 @@ def test_the_near_guess_is_a_tenth_away_and_at_most_the_largest_distance(
     arm_scene: Scene, size: float
 ) -> None:
     problem, robot = problem_of(arm_scene), arm_scene.robot
-    plain = cubic(robot, problem.boundary, T)
+    plain = cubic(robot, problem.ends, T)
     bump = np.abs(with_bump(plain, robot, T, seed=2)(TIMES)[0] - plain(TIMES)[0]).max()
 
     def motion(t: npt.NDArray[np.float64]) -> tuple[npt.NDArray[np.float64], ...]:

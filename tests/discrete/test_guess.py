@@ -12,18 +12,16 @@ import pytest
 from hovi.discrete.grid import Grid
 from hovi.discrete.guess import (
     NAMED,
-    Boundary,
     Curve,
     check_path,
     cubic,
     minimum_jerk,
-    moved,
     named_curve,
-    path_on_grid,
     regularized,
     stretched,
     with_bump,
 )
+from hovi.discrete.path_on_grid import moved, path_on_grid
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError
 from hovi.robot.loading import load_robot
@@ -36,12 +34,7 @@ from samples.manifold_robots import chain
 Array = npt.NDArray[np.float64]
 
 T = 1.7
-ENDS: Boundary = (
-    np.array([-1.5, 0.2]),
-    np.array([0.3, -0.8]),
-    np.array([0.4, 2.0]),
-    np.array([-1.1, 0.6]),
-)
+ENDS = np.array([[-1.5, 0.2], [0.4, 2.0]]), np.array([[0.3, -0.8], [-1.1, 0.6]])
 
 
 @pytest.fixture(params=["cubic", "minimum-jerk", "cubic with a bump", "quintic with a bump"])
@@ -61,8 +54,8 @@ def trajectory(curve: Curve, grid: Grid, scene: Scene) -> Trajectory:
 
 def test_a_curve_meets_both_ends(curve: Curve) -> None:
     q, v, _ = curve(np.array([0.0, T]))
-    np.testing.assert_allclose(q, [ENDS[0], ENDS[2]], rtol=0, atol=1e-14)
-    np.testing.assert_allclose(v, [ENDS[1], ENDS[3]], rtol=0, atol=1e-13)
+    np.testing.assert_allclose(q, ENDS[0], rtol=0, atol=1e-14)
+    np.testing.assert_allclose(v, ENDS[1], rtol=0, atol=1e-13)
 
 
 def test_v_and_a_are_derivatives_of_q(curve: Curve) -> None:
@@ -147,8 +140,8 @@ def test_a_path_has_the_nodes_of_the_curve_and_the_exact_boundary(
     q, v, _ = curve(grid.t)
     np.testing.assert_array_equal(path.q[1:-1], q[1:-1])
     np.testing.assert_array_equal(path.v[1:-1], v[1:-1])
-    for found, end in ((path.q[0], 0), (path.v[0], 1), (path.q[-1], 2), (path.v[-1], 3)):
-        np.testing.assert_array_equal(found, ENDS[end])
+    for found, ends in zip((path.q, path.v), ENDS, strict=True):
+        np.testing.assert_array_equal(found[[0, -1]], ends)
     np.testing.assert_array_equal(path.z, regularized(two_link, grid, path.q, path.v))
     for k, scheme in enumerate(grid.schemes):
         assert not path.inner[k, scheme.inner_modes :].any()
@@ -222,9 +215,9 @@ def test_a_motion_on_its_own_grid_is_reproduced(arm_scene: Scene, curve: Curve) 
 
 # Paths between other ends
 
-OTHER_ENDS: Boundary = tuple(  # type: ignore[assignment]
-    end + 0.1 * (i + 1) * np.array([1.0, -2.0]) for i, end in enumerate(ENDS)
-)
+OTHER_ENDS = [
+    x + 0.1 * np.array([[i + 1], [i + 3]]) * np.array([1.0, -2.0]) for i, x in enumerate(ENDS)
+]
 UNEQUAL = Grid(T * np.array([1, 2, 3, 4]) / 10, (by_name("galerkin-2"),) * 4)
 
 
@@ -232,15 +225,15 @@ def test_a_moved_path_is_the_path_plus_a_cubic(arm_scene: Scene, curve: Curve) -
     robot = arm_scene.robot
     path = path_on_grid(curve, UNEQUAL, ENDS, robot)
     found = moved(path, UNEQUAL, OTHER_ENDS, robot)
-    shift: Boundary = tuple(b - a for a, b in zip(ENDS, OTHER_ENDS, strict=True))  # type: ignore[assignment]
+    shift = [b - a for a, b in zip(ENDS, OTHER_ENDS, strict=True)]
     dq, dv, _ = cubic(robot, shift, T)(UNEQUAL.t)
     np.testing.assert_allclose(found.q, path.q + dq, rtol=0, atol=1e-13)
     np.testing.assert_allclose(found.v, path.v + dv, rtol=0, atol=1e-13)
     np.testing.assert_array_equal(found.inner, path.inner)
     z = regularized(robot, UNEQUAL, found.q, found.v)
     np.testing.assert_allclose(found.z, z, rtol=0, atol=1e-11)
-    for end, x in zip(OTHER_ENDS, (found.q[0], found.v[0], found.q[-1], found.v[-1]), strict=True):
-        np.testing.assert_array_equal(x, end)
+    for ends, x in zip(OTHER_ENDS, (found.q, found.v), strict=True):
+        np.testing.assert_array_equal(x[[0, -1]], ends)
 
 
 def test_a_path_with_the_same_boundary_is_bitwise_unchanged(two_link: Robot, curve: Curve) -> None:
@@ -277,9 +270,8 @@ def test_all_turns_within_an_interval_count_whenever_they_happen(power: int, tur
         a = size * power * (power - 1) * s ** max(power - 2, 0) / T**2
         return np.concatenate([np.cos(angle), np.sin(angle)], axis=1), v, a
 
-    ends = [x for each in (0.0, T) for x in curve(np.array([each]))[:2]]
-    boundary = tuple(x[0] for x in ends)
-    path = path_on_grid(curve, Grid.uniform(T, 1, galerkin(4)), boundary, robot)
-    v0, v1 = (x[0] for x in ends[1::2])
+    ends = curve(np.array([0.0, T]))[:2]
+    path = path_on_grid(curve, Grid.uniform(T, 1, galerkin(4)), ends, robot)
+    v0, v1 = ends[1]
     assert T**2 * path.z[0, 0] + T * v0 == pytest.approx(size, rel=1e-12)
     assert T * path.z[0, 1] == pytest.approx(v1 - v0, rel=1e-12)

@@ -14,7 +14,8 @@ from scipy.optimize import root
 from hovi import Solution, plan
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import Grid
-from hovi.discrete.guess import cubic, path_on_grid, with_turns
+from hovi.discrete.guess import cubic, with_turns
+from hovi.discrete.path_on_grid import path_on_grid
 from hovi.discrete.state import State
 from hovi.discrete.trajectory import Trajectory
 from hovi.effects import Armature, Effect, Gravity
@@ -85,8 +86,8 @@ def test_a_guess_keeps_several_turns_within_one_interval() -> None:
     robot = load_robot("kinova")
     q = robot.neutral()
     turns = np.array([0.0, 0, 0, 0, 0, 4])
-    curve = with_turns(cubic(robot, (q, np.zeros(6), q, np.zeros(6)), 1.0), robot, 1.0, turns)
-    grid, ends = Grid.uniform(1.0, 1, galerkin(2)), (q, np.zeros(6), q, np.zeros(6))
+    grid, ends = Grid.uniform(1.0, 1, galerkin(2)), (np.stack([q, q]), np.zeros((2, 6)))
+    curve = with_turns(cubic(robot, ends, 1.0), robot, 1.0, turns)
     path = path_on_grid(curve, grid, ends, robot)
     np.testing.assert_allclose(path.z[0, 0], 8 * np.pi * (turns > 0), atol=1e-12)
 
@@ -116,7 +117,7 @@ def test_v_and_a_of_a_guess_with_many_turns_are_derivatives_of_q(base: str) -> N
     axis = {"free-flyer": slice(3, 6), "spherical": slice(0, 3), "planar": slice(2, 3)}[base]
     turns = np.zeros(robot.nv)
     turns[axis] = [20.0] if base == "planar" else [4.0, -8.0, 19.0]  # of length 21
-    curve = with_turns(cubic(robot, (q0, v0, q1, v1), 1.0), robot, 1.0, turns)
+    curve = with_turns(cubic(robot, ((q0, q1), (v0, v1)), 1.0), robot, 1.0, turns)
     h, t = 1e-5, np.linspace(0.05, 0.95, 40)
     (qm, vm, _), (_, v, a), (qp, vp, _) = curve(t - h), curve(t), curve(t + h)
     # the error of central differences: h^2 |w|^3 / 6 and less, with |w| up to 200 rad/s

@@ -38,7 +38,7 @@ def least_action(
     grid, n = problem.grid, problem.robot.nv
     N, r = grid.intervals, grid.inner_modes
     nodes, modes = ca.MX.sym("nodes", 2 * n, N - 1), ca.MX.sym("modes", n, r * N)
-    q0, v0, q1, v1 = problem.boundary
+    (q0, q1), (v0, v1) = problem.ends
     ends = [np.concatenate(end)[:, None] for end in ((q0, v0), (q1, v1))]
     all_nodes = ca.horzcat(ends[0], nodes, ends[1])
     left, right = all_nodes[:, :-1], all_nodes[:, 1:]

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from hovi.discrete.guess import Curve, cubic, stretched, with_turns
-from hovi.discrete.path_of_any_order import polynomial
+from hovi.discrete.guess import Curve, named_curve, stretched, with_turns
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError, nearest
 from hovi.planning.problem.problem import TrajectoryProblem
@@ -38,9 +37,7 @@ def guess_curve(
     """
     robot, T = problem.robot, problem.grid.duration
     k = problem.ld.k
-    plain = cubic(robot, problem.boundary, T)
-    if k != 2:
-        plain = polynomial(robot, problem.end_jets, T, np.zeros(robot.nv))
+    plain = named_curve("cubic", robot, problem.ends, T)
     if name == "cubic":
         return with_turns(plain, robot, T, problem.turns) if problem.turns.any() else plain
     if name != "near":

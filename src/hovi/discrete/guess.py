@@ -16,10 +16,11 @@ from hovi.errors import ChartError, InputError, nearest
 from hovi.robot.space.coordinates import Coordinates
 from hovi.schemes.interval_curve import jet_rows
 from hovi.schemes.polynomials import interval_rows
+from hovi.schemes.scheme import regular_from_nodal
 
 Array = npt.NDArray[np.float64]
-Boundary = tuple[Array, Array, Array, Array]
-"""(q0, v0, q1, v1): two configurations (nq,) and two velocities (nv,)."""
+Ends = Sequence[Array]
+"""(q, q', ..., q^(k-1)) at the start and at the goal: k arrays of two rows, (2, nq) and (2, nv)."""
 
 MISFIT_TOLERANCE = 1e-6
 """Largest difference, relative to q, between the z of a given path and that of its q and v."""
@@ -40,12 +41,12 @@ class Curve(Protocol):
         """The curve at t."""
 
 
-def cubic(coordinates: Coordinates, boundary: Boundary, duration: float) -> Curve:
+def cubic(coordinates: Coordinates, ends: Ends, duration: float) -> Curve:
     """The cubic through both ends, x(t) of q0 (+) x: the minimizer of 1/2 |x''|^2.
 
-    boundary: (q0, v0, q1, v1). duration: T, in [s].
+    ends: (q, v) at both. duration: T, in [s].
     """
-    q0, v0, q1, v1 = boundary
+    (q0, q1), (v0, v1) = ends
     T = duration
     x1 = coordinates.difference(q0, q1)
     dx1 = coordinates.chart.rates(x1[None], v1[None])[0][0]
@@ -58,9 +59,9 @@ def cubic(coordinates: Coordinates, boundary: Boundary, duration: float) -> Curv
     return curve
 
 
-def minimum_jerk(coordinates: Coordinates, boundary: Boundary, duration: float) -> Curve:
+def minimum_jerk(coordinates: Coordinates, ends: Ends, duration: float) -> Curve:
     """The quintic through both ends with x'' = 0 there; arguments as for `cubic`."""
-    q0, v0, q1, v1 = boundary
+    (q0, q1), (v0, v1) = ends
     T = duration
     x1 = coordinates.difference(q0, q1)
     dx1 = coordinates.chart.rates(x1[None], v1[None])[0][0]
@@ -72,8 +73,8 @@ def minimum_jerk(coordinates: Coordinates, boundary: Boundary, duration: float) 
                 j - derivative
             )
     zero = np.zeros(coordinates.nv)
-    ends = np.stack([zero, T * v0, zero, x1, T * dx1, zero])
-    c = np.linalg.solve(conditions, ends)  # (6, n)
+    known = np.stack([zero, T * v0, zero, x1, T * dx1, zero])
+    c = np.linalg.solve(conditions, known)  # (6, n)
 
     def curve(t: Array) -> tuple[Array, Array, Array]:
         s = (t / T)[None]
@@ -83,6 +84,46 @@ def minimum_jerk(coordinates: Coordinates, boundary: Boundary, duration: float) 
         return in_chart(coordinates, q0, x, dx / T, ddx / T**2)
 
     return curve
+
+
+def hermite(ends: Array, duration: float) -> Curve:
+    """The polynomial of degree 2 k - 1 between two points: the minimizer of 1/2 |q^(k)|^2.
+
+    ends: (q, q', ..., q^(k-1)) at the start and at the goal, shape (2, k, n). duration: T, in [s].
+    """
+    k, T = ends.shape[1], duration
+    scaled = ends * T ** np.arange(k)[:, None]
+    local = np.concatenate([scaled[0, 1:], regular_from_nodal(0, k)[k:] @ np.concatenate(scaled)])
+
+    def curve(t: Array) -> tuple[Array, ...]:
+        jet = jet_rows(np.asarray(t) / T, k, 0, max(k, 2)) @ local
+        rates = (jet[:, j] / T**j for j in range(1, jet.shape[1]))
+        return ends[0, 0] + jet[:, 0], *rates
+
+    return curve
+
+
+def polynomial(on: Coordinates, ends: Ends, duration: float, turns: Array) -> Curve:
+    """The curve q0 (+) x(t) with the Hermite polynomial x between two points of T^(k-1)Q.
+
+    On vector spaces, commutative groups, and for k = 1.
+    turns: as in `with_turns`. duration: T, in [s].
+    """
+    q, *rates = ends
+    if on.vector_joints:
+        return hermite(np.stack(ends, axis=1), duration)
+    x1 = on.difference(q[0], q[1])
+    if on.space.flat:
+        x1 = x1 + 2 * np.pi * turns
+    x = hermite(np.stack([np.stack([0 * x1, x1]), *rates], axis=1), duration)
+
+    def curve(t: Array) -> tuple[Array, ...]:
+        jet = x(t)
+        if not on.space.flat:
+            return in_chart(on, q[0], *jet)
+        return on.integrate(q[0], jet[0]), *jet[1:]
+
+    return curve if on.space.flat else with_turns(curve, on, duration, turns)
 
 
 def in_chart(
@@ -159,17 +200,26 @@ def _modulo_period(coordinates: Coordinates, x: Array) -> Array:
     return left
 
 
-NAMED: dict[str, Callable[[Coordinates, Boundary, float], Curve]] = {
+NAMED: dict[str, Callable[[Coordinates, Ends, float], Curve]] = {
     "cubic": cubic,
     "minimum-jerk": minimum_jerk,
 }
 """Guesses by their name in files and on the command line."""
 
 
-def named_curve(name: str, coordinates: Coordinates, boundary: Boundary, duration: float) -> Curve:
-    """The guess with a name. Raises InputError for an unknown name."""
+def named_curve(
+    name: str, on: Coordinates, ends: Ends, duration: float, turns: Array | None = None
+) -> Curve:
+    """The guess with a name; for orders other than 2 the Hermite polynomial, whatever the name.
+
+    turns: as in `with_turns`; none if None. Raises InputError for an unknown name.
+    """
     require_guess(name)
-    return NAMED[name](coordinates, boundary, duration)
+    turns = np.zeros(on.nv) if turns is None else turns
+    if len(ends) != 2:
+        return polynomial(on, ends, duration, turns)
+    curve = NAMED[name](on, ends, duration)
+    return with_turns(curve, on, duration, turns) if turns.any() else curve
 
 
 def require_guess(name: str) -> None:
@@ -201,20 +251,6 @@ def stretched(trajectory: Trajectory, duration: float, order: int = 2) -> Curve:
     return curve
 
 
-def path_on_grid(
-    curve: Curve, grid: Grid, boundary: Boundary, coordinates: Coordinates
-) -> DiscretePath:
-    """The curve on a grid: its nodes, and its acceleration projected on the inner modes.
-
-    The ends are exactly the boundary data.
-    """
-    q, v, _ = (x.copy() for x in curve(grid.t))
-    q[0], v[0], q[-1], v[-1] = boundary
-    rotation = None if coordinates.vector_joints else rotation_along(curve, grid, coordinates)
-    inner = _inner_modes(curve, grid, coordinates, q)
-    return DiscretePath(q, v, regularized(coordinates, grid, q, v, rotation), inner)
-
-
 def check_path(path: DiscretePath, grid: Grid, coordinates: Coordinates) -> None:
     """Raise InputError for a path that does not match its grid, or contradicts itself."""
     N, r, n = grid.intervals, grid.inner_modes, coordinates.nv
@@ -237,30 +273,6 @@ def check_path(path: DiscretePath, grid: Grid, coordinates: Coordinates) -> None
             "the guess's z does not match its q and v: on vector spaces "
             "z0 = (q1 - q0 - h v0)/h^2 and z1 = (v1 - v0)/h."
         )
-
-
-def moved(
-    path: DiscretePath, grid: Grid, boundary: Boundary, coordinates: Coordinates
-) -> DiscretePath:
-    """A path plus the cubic that moves its ends to other boundary data."""
-    q0, v0, q1, v1 = boundary
-    old = path.q[0], path.v[0], path.q[-1], path.v[-1]
-    if [x.tolist() for x in old] == [x.tolist() for x in boundary]:
-        return path
-    dq0, dq1 = coordinates.difference(old[0], q0), coordinates.difference(old[2], q1)
-    ends = np.stack([dq0, v0 - old[1], dq1, v1 - old[3]])  # (4, n)
-    T, s = grid.duration, grid.t / grid.duration
-    local = np.stack([T * ends[1], ends[2] - ends[0] - T * ends[1], T * (ends[3] - ends[1])])
-    dq, Tdv, TTda = np.moveaxis(interval_rows(s, 0) @ local, 1, 0)  # (N + 1, n) each
-    h = (grid.steps / T)[:, None]
-    # for a cubic z1 is the mean acceleration, and z0 = a/2 + h j/6 with the jerk j
-    jerk = np.diff(TTda, axis=0) / h
-    z = np.stack([TTda[:-1] / 2 + h * jerk / 6, TTda[:-1] + h * jerk / 2], axis=1) / T**2
-    q = coordinates.integrate(path.q, ends[0] + dq)
-    q[0], q[-1] = q0, q1
-    v = path.v + Tdv / T
-    v[0], v[-1] = v0, v1
-    return with_ends_of_nodes(DiscretePath(q, v, path.z + z, path.inner), grid, coordinates)
 
 
 def regularized(
@@ -316,7 +328,7 @@ def rotation_along(curve: Curve, grid: Grid, coordinates: Coordinates) -> Array:
     return np.asarray(grid.steps[:, None] * np.einsum("q,kqn->kn", w / 2, v))
 
 
-def _inner_modes(curve: Curve, grid: Grid, coordinates: Coordinates, nodes: Array) -> Array:
+def modes_of(curve: Curve, grid: Grid, coordinates: Coordinates, nodes: Array) -> Array:
     """c_j = integral of b_j x'' over the interval, by Gauss quadrature, shape (N, r, n).
 
     nodes: configurations, shape (N + 1, nq).

@@ -72,8 +72,8 @@ def ipopt(
 ) -> tuple[float, Array]:
     """The cost and the unknowns that Ipopt finds."""
     program, collocation = discrete(problem, samples)
-    guess = cubic(problem.robot, problem.boundary, problem.grid.duration)
-    w = collocation.unknowns(guess, problem.boundary)
+    guess = cubic(problem.robot, problem.ends, problem.grid.duration)
+    w = collocation.unknowns(guess, problem.ends)
     free = np.where(collocation.fixed[:, None], 0.0, np.inf)
     ends = {"lbx": (w - free).ravel(), "ubx": (w + free).ravel()}
     solver = program.solver(kernels)

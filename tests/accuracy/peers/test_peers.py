@@ -151,13 +151,13 @@ def test_compiled_and_interpreted_kernels_agree(setting: Setting) -> None:
 
 
 def test_a_cubic_guess_is_represented_exactly(two_link: Robot) -> None:
-    boundary = (np.array([0.1, 0.2]), np.array([0.3, 0.4]), np.array([1.0, -1.0]), np.zeros(2))
-    curve = cubic(two_link, boundary, 2.0)
+    ends = np.array([[0.1, 0.2], [1.0, -1.0]]), np.array([[0.3, 0.4], [0.0, 0.0]])
+    curve = cubic(two_link, ends, 2.0)
     method = Collocation(collocation_table("lg-3"), 5, 2.0, 2)
-    w = method.unknowns(curve, boundary)
+    w = method.unknowns(curve, ends)
     t = np.linspace(0.0, 2.0, 23)
     np.testing.assert_allclose(method.configurations(w, t), curve(t)[0], atol=1e-13)
-    np.testing.assert_array_equal(w[method.fixed], np.stack(boundary))
+    np.testing.assert_array_equal(w[method.fixed], np.stack(ends, axis=1).reshape(4, 2))
     defects = np.array(method.program.defects @ w.ravel()).ravel()
     np.testing.assert_allclose(defects, 0, atol=1e-13)
 
@@ -224,7 +224,7 @@ def test_a_python_without_the_tool_raises_with_the_missing_module(setting: Setti
 def test_torque_limits_raise_the_cost_of_crocoddyl_and_goals_move(setting: Setting) -> None:
     t = np.linspace(0.0, setting.problem.grid.duration, 81)
     q, v, a = (x.tolist() for x in setting.guess(t))
-    goal = [*setting.problem.boundary[2] + 0.01, *setting.problem.boundary[3]]
+    goal = [*setting.problem.ends[0][1] + 0.01, *setting.problem.ends[1][1]]
     costs = []
     for limits in (None, [7.0, 7.0]):
         worker = Worker(Path(os.environ["HOVI_CROCODDYL_PYTHON"]), "crocoddyl_worker")

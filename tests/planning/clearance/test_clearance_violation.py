@@ -11,7 +11,7 @@ import pytest
 import hovi
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import Grid
-from hovi.discrete.guess import path_on_grid
+from hovi.discrete.path_on_grid import path_on_grid
 from hovi.discrete.trajectory import Trajectory
 from hovi.planning.clearance.clearance import Clearance
 from hovi.planning.clearance.clearance_violation import (
@@ -42,7 +42,7 @@ def turning(scene: hovi.Scene) -> Trajectory:
         return q, np.broadcast_to(rate, q.shape).copy(), np.zeros_like(q)
 
     problem = TrajectoryProblem(ld, hovi.State(START, rate), hovi.State(GOAL, rate))
-    return problem.trajectory(path_on_grid(curve, grid, problem.boundary, scene.robot))
+    return problem.trajectory(path_on_grid(curve, grid, problem.ends, scene.robot))
 
 
 def tip(scene: hovi.Scene, q: Array) -> Array:

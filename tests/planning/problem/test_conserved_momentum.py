@@ -118,15 +118,15 @@ def test_a_goal_that_needs_another_momentum_is_infeasible() -> None:
     free = np.zeros((2, 2, 9), dtype=bool)
     free[1, 0, :3] = True
     q, _ = task.start.on(task.scene.robot, "start")
-    sentence = free_fall_contradiction(task.scene, (q, np.zeros(9), q, v), free, 8.0)
+    sentence = free_fall_contradiction(task.scene, ([q, q], [np.zeros(9), v]), free, 8.0)
     assert "angular momentum is off by" in sentence
     arm = free.copy()
     arm[1, 1, 8] = True  # one joint cannot take up what the base has
-    sentence = free_fall_contradiction(task.scene, (q, np.zeros(9), q, v), arm, 8.0)
+    sentence = free_fall_contradiction(task.scene, ([q, q], [np.zeros(9), v]), arm, 8.0)
     assert "momentum is off by" in sentence
     turned = free.copy()
     turned[1, 0, 3:6] = True  # then the momentum of the goal is unknown
-    assert free_fall_contradiction(task.scene, (q, np.zeros(9), q, v), turned, 8.0) == ""
+    assert free_fall_contradiction(task.scene, ([q, q], [np.zeros(9), v]), turned, 8.0) == ""
     moving = hovi.plan(task.scene, state, task.start, 8.0, limits="none", self_collision=False)
     assert moving.status is hovi.Status.INFEASIBLE
 
@@ -197,10 +197,10 @@ def test_only_what_follows_from_the_momenta_is_freed(
     free[1, 1, 6:] = arm_rates_free
     free[1, 0, 3:6] = turn_free
     v = 0.1 * moving * np.ones(9)
-    found = without_redundancy(scene, v, free)
+    found = without_redundancy(scene, ([], [v, v]), free)
     expected = free.copy()
     expected[1, 0, :3] |= not turn_free
     expected[1, 1, :6] |= freed == "velocity"
     np.testing.assert_array_equal(found, expected)
     free[0, 0, 0] = True  # a free start
-    np.testing.assert_array_equal(without_redundancy(scene, v, free), free)
+    np.testing.assert_array_equal(without_redundancy(scene, ([], [v, v]), free), free)

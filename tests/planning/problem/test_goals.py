@@ -94,7 +94,7 @@ def test_a_hand_that_a_frame_goal_does_not_mention_keeps_its_opening() -> None:
         hovi.Scene(robot).effort_lagrangian(), hovi.Grid.uniform(1.0, 4, galerkin(2))
     )
     problem = hovi.TrajectoryProblem(ld, hovi.State(start), goal)
-    np.testing.assert_array_equal(problem.boundary[2][-2:], start[-2:])
+    np.testing.assert_array_equal(problem.ends[0][1][-2:], start[-2:])
     np.testing.assert_array_equal(problem.free_ends[1, 0], [True] * 7 + [False] * 2)
     loose = hovi.State(start, free=["panda_finger_joint1"])
     problem = hovi.TrajectoryProblem(ld, loose, goal)

@@ -10,7 +10,7 @@ import pytest
 from hovi import plan
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import Grid
-from hovi.discrete.guess import path_on_grid
+from hovi.discrete.path_on_grid import path_on_grid
 from hovi.discrete.state import State
 from hovi.discrete.trajectory import Trajectory
 from hovi.planning.problem.limit_violation import (
@@ -150,8 +150,7 @@ def _require_the_highest(
     ld = DiscreteLagrangian(scene.effort_lagrangian(), Grid.uniform(1.0, 1, galerkin(9)))
     problem = TrajectoryProblem(ld, State([q(0.0), 0.0]), State([q(1.0), 0.0]))
     ends = curve(np.array([0.0, 1.0]))
-    boundary = ends[0][0], ends[1][0], ends[0][1], ends[1][1]
-    motion = problem.trajectory(path_on_grid(curve, ld.grid, boundary, robot))
+    motion = problem.trajectory(path_on_grid(curve, ld.grid, ends[:2], robot))
     s = np.linspace(0.0, 1.0, 100_001)
     np.testing.assert_allclose(motion.sample(s).v[:, 0], v(s), atol=1e-10)
     limits = as_limits(robot, {"base": "none", "v": [1.0, 1.0]})

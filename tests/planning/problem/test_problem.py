@@ -39,10 +39,15 @@ def test_a_problem_knows_its_grid_scene_robot_and_ends(two_link: Robot) -> None:
     assert found.robot is two_link
     assert found.scene.robot is two_link
     assert found.grid is found.ld.grid
-    expected = ([1.0, 2.0], [3.0, 4.0], [5.0, 6.0], [0.0, 0.0])
-    for end, numbers in zip(found.boundary, expected, strict=True):
-        assert end.dtype == np.float64
-        np.testing.assert_array_equal(end, numbers)
+    expected = [[1.0, 2.0], [5.0, 6.0]], [[3.0, 4.0], [0.0, 0.0]]
+    for rows, numbers in zip(found.ends, expected, strict=True):
+        assert rows.dtype == np.float64
+        np.testing.assert_array_equal(rows, numbers)
+    with pytest.warns(DeprecationWarning, match="is now `ends`"):
+        q0, v0, q1, v1 = found.boundary
+    np.testing.assert_array_equal([[q0, q1], [v0, v1]], expected)
+    with pytest.warns(DeprecationWarning, match="is now `ends`"):
+        assert found.end_jets == ()
 
 
 def test_between_other_ends_the_finer_problem_shares_what_was_built(two_link: Robot) -> None:
@@ -52,7 +57,7 @@ def test_between_other_ends_the_finer_problem_shares_what_was_built(two_link: Ro
         other = first.between(State([0.1, 0.0]), State([2.0, 1.0]))
         assert other.finer.ld is known.ld
         assert other.finer.structure is known.structure
-        np.testing.assert_array_equal(other.finer.boundary[0], [0.1, 0.0])
+        np.testing.assert_array_equal(other.finer.ends[0][0], [0.1, 0.0])
         assert other.finer.finer.grid.inner_modes == first.finer.grid.inner_modes + 2
         first = other.between(REST, State([1.0, 1.0]))  # without a finer problem in between
     free = first.between(REST, State([3.0, 1.0], free_velocity="all"))
@@ -85,7 +90,7 @@ def test_between_other_ends_it_is_the_problem_that_would_be_built_there(
     found = first.between(*ENDS[ends])
     anew = TrajectoryProblem(ld, *ENDS[ends], limits, via)
     assert {*vars(anew)} <= {*vars(found)}
-    for name in ("boundary", "end_jets", "free_ends", "turns"):
+    for name in ("ends", "free_ends", "turns"):
         if hasattr(anew, name):
             np.testing.assert_array_equal(getattr(found, name), getattr(anew, name))
     assert (found.ld, found.start, found.goal) == (ld, *ENDS[ends])
@@ -118,14 +123,15 @@ def test_the_ends_are_copies_of_the_callers_arrays(two_link: Robot) -> None:
     q = np.array([1.0, 2.0])
     found = problem(two_link, State(q))
     q[:] = 9.0
-    np.testing.assert_array_equal(found.boundary[0], [1.0, 2.0])
+    np.testing.assert_array_equal(found.ends[0][0], [1.0, 2.0])
 
 
 def test_a_sampled_curve_keeps_its_own_ends_where_they_are_free(two_link: Robot) -> None:
     start = State([0.1, 0.2], [0.3, 0.4], free=["elbow"], free_velocity=["shoulder"])
     goal = State([1.1, 1.2], [1.3, 1.4], free=["shoulder"], free_velocity=["elbow"])
     ends = np.array([[5.0, 6.0], [7.0, 8.0], [9.0, 10.0], [11.0, 12.0]])
-    path = problem(two_link, start, goal).path(cubic(two_link, tuple(ends), 1.0))
+    curve = cubic(two_link, (ends[::2], ends[1::2]), 1.0)
+    path = problem(two_link, start, goal).path(curve)
     np.testing.assert_allclose(path.q[[0, -1]], [[0.1, 6.0], [9.0, 1.2]], rtol=1e-14)
     np.testing.assert_allclose(path.v[[0, -1]], [[7.0, 0.4], [1.3, 12.0]], rtol=1e-14)
 

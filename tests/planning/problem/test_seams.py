@@ -75,7 +75,7 @@ def test_a_guess_passes_every_seam_and_its_velocity_is_continuous(order: int, na
     stop = hold(2, [[True, True], [True, True]], time=1.0)
     jets = [np.zeros((2, 2)) for _ in range(order)]
     jets[0][1] = [1.5, 0.5]
-    curve = curve_through(name, ROBOT, jets, [passing, stop], 1.5)
+    curve = curve_through(name, ROBOT, jets, 1.5, [passing, stop])
     d = 1e-7
     for t, q in ((0.0, [0.0, 0.0]), (0.6, [0.7, 0.9]), (1.0, [0.7, 0.9]), (1.5, [1.5, 0.5])):
         np.testing.assert_allclose(curve(np.array([t]))[0][0], q, atol=1e-12)
@@ -91,7 +91,7 @@ def test_a_guess_passes_every_seam_and_its_velocity_is_continuous(order: int, na
 def test_a_free_velocity_of_a_guess_is_the_mean_one_unless_it_would_reverse() -> None:
     passing = Hold(1, 0.5, np.array([1.0, 1.0]), np.zeros(2), np.array([[True] * 2, [False] * 2]))
     jets = [np.array([[0.0, 0.0], [3.0, -1.0]]), np.zeros((2, 2))]
-    curve = curve_through("cubic", ROBOT, jets, [passing], 1.5)
+    curve = curve_through("cubic", ROBOT, jets, 1.5, [passing])
     assert curve(np.array([0.5]))[1][0] == pytest.approx([2.0, 0.0])
 
 

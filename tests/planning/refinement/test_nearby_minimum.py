@@ -10,7 +10,7 @@ import pytest
 from hovi import Solution, Status
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import Grid
-from hovi.discrete.guess import moved
+from hovi.discrete.path_on_grid import moved
 from hovi.discrete.state import State
 from hovi.effects import Gravity
 from hovi.planning.problem.problem import TrajectoryProblem
@@ -93,7 +93,7 @@ def test_a_minimum_some_way_off_takes_several_hessians(arm_scene: Scene) -> None
     other = solve_on_grid(TrajectoryProblem(ld, State(HANG), State(np.add(REACH_Q, 0.2), REACH_V)))
     assert there.problem is not None
     problem, objective = there.problem, ActionObjective(there.problem)
-    start = moved(other.trajectory.path, problem.grid, problem.boundary, problem.robot)
+    start = moved(other.trajectory.path, problem.grid, problem.ends, problem.robot)
     first = objective.model(start, None, None)
     found = nearby_minimum(objective, start, first)
     assert found is not None

@@ -12,7 +12,8 @@ import pytest
 import hovi
 from hovi import PlanOptions, Solution, Status
 from hovi.discrete.grid import DiscretePath, Grid
-from hovi.discrete.guess import cubic, path_on_grid, with_bump
+from hovi.discrete.guess import cubic, with_bump
+from hovi.discrete.path_on_grid import path_on_grid
 from hovi.discrete.state import State
 from hovi.planning.paths.first_guesses import FirstGuesses
 from hovi.planning.search import multistart
@@ -51,9 +52,9 @@ def job(arm_scene: Scene) -> Job:
 @pytest.fixture(scope="module")
 def guesses(job: Job) -> list:
     problem = job.problem()
-    base = cubic(problem.robot, problem.boundary, 3.0)
+    base = cubic(problem.robot, problem.ends, 3.0)
     curves = [base, *(with_bump(base, problem.robot, 3.0, seed) for seed in range(6))]
-    return [path_on_grid(c, job.grid, problem.boundary, problem.robot) for c in curves]
+    return [path_on_grid(c, job.grid, problem.ends, problem.robot) for c in curves]
 
 
 def silent(text: str, fraction: float) -> None:
@@ -77,7 +78,7 @@ def test_a_job_is_the_problem_it_describes(job: Job, arm_scene: Scene) -> None:
     assert weighted.scene is arm_scene
     assert weighted.grid is job.grid
     np.testing.assert_array_equal(weighted.ld.lagrangian.weight, [1.0, 5.0])  # type: ignore[attr-defined]
-    np.testing.assert_array_equal(weighted.boundary[2], -HANG)
+    np.testing.assert_array_equal(weighted.ends[0][1], -HANG)
 
 
 @pytest.mark.parametrize("processes", [1, 2])

@@ -98,7 +98,7 @@ def saddle(arm_scene: Scene) -> DiscretePath:
 def assert_fits(problem: TrajectoryProblem, solution: Solution) -> None:
     """The motion meets its ends to the last bit, and q, v and z are consistent."""
     path = solution.trajectory.path
-    q0, v0, q1, v1 = problem.boundary
+    (q0, q1), (v0, v1) = problem.ends
     for found, end in zip((path.q[0], path.v[0], path.q[-1], path.v[-1]), (q0, v0, q1, v1)):  # noqa: B905
         np.testing.assert_array_equal(found, end)
     z = regularized(problem.robot, problem.grid, path.q, path.v)

@@ -11,7 +11,7 @@ from scipy.interpolate import CubicHermiteSpline
 
 from hovi.accuracy.peers.collocation_table import CollocationTable, lagrange_integrals
 from hovi.accuracy.peers.point_program import PointProgram, casadi_matrix
-from hovi.discrete.guess import Boundary, Curve
+from hovi.discrete.guess import Curve, Ends
 from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
@@ -63,13 +63,13 @@ class Collocation:
             np.concatenate(weights),
         )
 
-    def unknowns(self, guess: Curve, boundary: Boundary) -> Array:
+    def unknowns(self, guess: Curve, ends: Ends) -> Array:
         """w of a curve, with the boundary values at its ends."""
         q, v, a = guess(np.linspace(0.0, self.duration, self.intervals + 1))
         w, size = np.zeros((self.rows, self.joints)), self.table.node_size
         for i, x in enumerate((q, v, a)[:size]):
             w[i :: self.stride][: self.intervals + 1] = x
-        w[0], w[1], w[self._last], w[self._last + 1] = boundary
+        (w[0], w[self._last]), (w[1], w[self._last + 1]) = ends
         if len(self.table.inner):
             inner = guess(self._inner_times)[2]
             body = w[: self._last].reshape(self.intervals, self.stride, self.joints)

@@ -124,6 +124,6 @@ def scene_request(setting: Setting) -> dict[str, Any]:
         "longest": setting.longest,
         "clock": setting.clock,
         "duration": problem.grid.duration,
-        "ends": [np.asarray(x).tolist() for x in problem.boundary],
+        "ends": [np.asarray(x).tolist() for x in (x[end] for end in (0, 1) for x in problem.ends)],
         "check": {name: x.tolist() for name, x in check.items()},
     }

@@ -46,7 +46,7 @@ class CollocationMethod(Method):
         problem = self._setting.problem
         kernels, before = self._kernels.of(self._setting)
         collocation = Collocation(self._table, intervals, problem.grid.duration, problem.robot.nv)
-        w = collocation.unknowns(self._setting.guess, problem.boundary)
+        w = collocation.unknowns(self._setting.guess, problem.ends)
         watch = Stopwatch(self._setting.clock)
         solver = collocation.program.solver(kernels)
         seconds = before + watch.seconds

@@ -51,14 +51,15 @@ def distances_within_reach(robot: Robot, clearance: Clearance) -> Distances | No
 def with_gaps(
     robot: Robot,
     clearance: Clearance,
-    boundary: tuple[Array, Array, Array, Array],
+    q: Array,
     free: Mask,
     duration: float,
 ) -> Clearance:
     """The clearance, by which pairs may be as near as they are at an end, up to MOST_GAP.
 
     An end that is measured, or computed by another program, at the margin is not exactly there.
-    boundary: q and v of both ends. free: which of these are free, (2, k, nv). duration: in [s].
+    q: at both ends, (2, nq). free: which components of (q, v, ...) are free there, (2, k, nv).
+    duration: T, in [s].
     Raises as Distances does.
     """
     if isinstance(clearance, PartOfClearance):
@@ -72,7 +73,7 @@ def with_gaps(
     for i in (0, 1) if margin > MOST_GAP else ():
         if free[i, 0].any():
             continue
-        at = distances.at(boundary[2 * i][None], i * duration)
+        at = distances.at(q[i : i + 1], i * duration)
         d = distances.values(at, margin + float(known.max(initial=0.0)))[0] - known
         for k in np.flatnonzero((d < margin) & (d >= margin - MOST_GAP)):
             pair = distances.pairs[k].link, distances.pairs[k].other

@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
+from hovi.discrete.guess import Ends
 from hovi.robot.space.joint_kinds import FLOATING, kind_of
 from hovi.scene.scene import Scene
 from hovi.system.dataclass import dataclass
@@ -59,16 +60,14 @@ def after_free_fall(scene: Scene, start: CentroidalState, duration: float) -> Ce
     return CentroidalState(center, start.linear + mass * g * T, start.angular)
 
 
-def free_fall_contradiction(
-    scene: Scene, boundary: tuple[Array, Array, Array, Array], free: Mask, duration: float
-) -> str:
+def free_fall_contradiction(scene: Scene, ends: Ends, free: Mask, duration: float) -> str:
     """Why no joint torques take a free-falling robot from one state to another, or "".
 
-    boundary: (q0, v0, q1, v1). free: which of (q, v) are free at both ends, shape (2, 2, nv).
+    ends: (q, v) at both. free: which of (q, v) are free at both ends, shape (2, 2, nv).
     """
     if not falls_freely(scene) or free[0].any():
         return ""
-    q0, v0, q1, v1 = boundary
+    (q0, q1), (v0, v1) = ends[:2]
     expected = after_free_fall(scene, centroidal_state(scene, q0, v0), duration)
     base = scene.robot.joint_names[0]
     if not free[1, 0].any():
@@ -84,10 +83,10 @@ def free_fall_contradiction(
     return ""
 
 
-def without_redundancy(scene: Scene, v1: Array, free: Mask) -> Mask:
+def without_redundancy(scene: Scene, ends: Ends, free: Mask) -> Mask:
     """The free components of both ends, with redundant ones of the base freed.
 
-    v1: velocity at the goal, shape (nv,). free: as above, shape (2, 2, nv).
+    ends, free: as above.
     The base's position is redundant if all else of the goal's configuration is fixed, and its
     velocity if all joint rates are. Redundant equations would have no unique multipliers.
     """
@@ -96,7 +95,7 @@ def without_redundancy(scene: Scene, v1: Array, free: Mask) -> Mask:
     freed = free.copy()
     if not free[1, 0].any():
         freed[1, 0, :3] = True
-    known = not free[1, 0, 3:].any() or _at_rest(v1, free)
+    known = not free[1, 0, 3:].any() or _at_rest(ends[1][1], free)
     if known and not free[1, 1, 6:].any():
         freed[1, 1, :6] = True
     return freed

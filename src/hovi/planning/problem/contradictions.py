@@ -68,7 +68,7 @@ def _end_in_obstacle(problem: TrajectoryProblem) -> str:
         if problem.free_ends[i, 0].any():
             continue
         t = i * problem.grid.duration
-        d = problem.distances.values(problem.distances.at(problem.boundary[2 * i][None], t))[0]
+        d = problem.distances.values(problem.distances.at(problem.ends[0][i][None], t))[0]
         k = int(np.argmin(d))
         if d[k] < margin - MARGIN_TOLERANCE:
             distance = float(d[k] - problem.distances.allowance[k])

@@ -15,12 +15,12 @@ import numpy.typing as npt
 from hovi.checks.arguments import check_arguments
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import DiscretePath, Grid
-from hovi.discrete.guess import Boundary, Curve, moved, named_curve, path_on_grid, with_turns
+from hovi.discrete.guess import Curve, Ends, named_curve
 from hovi.discrete.output.stored_torque import StoredTorque
-from hovi.discrete.path_of_any_order import moved_any, path_of_any_order, polynomial, with_fixed
+from hovi.discrete.path_on_grid import moved, path_on_grid, with_fixed
 from hovi.discrete.state import Periodic, State
 from hovi.discrete.trajectory import Trajectory
-from hovi.errors import InputError
+from hovi.errors import InputError, warn
 from hovi.planning.clearance.clearance import Clearance
 from hovi.planning.clearance.distances import Distances
 from hovi.planning.clearance.within_reach import distances_within_reach, with_gaps
@@ -64,8 +64,8 @@ class TrajectoryProblem(ProblemSummary):
     start: state at t = 0. goal: state at t = T, a task-space goal, or Periodic.
     limits: bounds along the motion; none if None. via: via points, at nodes of the grid.
     clearance: obstacles and their margin; none if None. time_weight: w of J + w T.
-    boundary: (q0, v0, q1, v1) of the two ends; initial guesses in free components.
-    end_jets: (q, q', ..., q^(k-1)) of the two ends for orders k other than 2, k arrays of two rows.
+    ends: (q, q', ..., q^(k-1)) at the start and at the goal, k arrays of two rows; initial guesses
+        in free components.
     free_ends: which of (q, q', ..., q^(k-1)) are free at the start and at the goal, shape
         (2, k, nv).
     equations: at nodes. holds: what is fixed where segments meet.
@@ -81,8 +81,7 @@ class TrajectoryProblem(ProblemSummary):
     via: tuple[Via, ...] = ()
     clearance: Clearance | None = None
     time_weight: float = 0.0
-    boundary: Boundary = field(init=False, repr=False)
-    end_jets: tuple[Array, ...] = field(init=False, repr=False)
+    ends: tuple[Array, ...] = field(init=False, repr=False)
     free_ends: Mask = field(init=False, repr=False)
     equations: tuple[Equation, ...] = field(init=False, repr=False)
     holds: tuple[Hold, ...] = field(init=False, repr=False)
@@ -109,9 +108,9 @@ class TrajectoryProblem(ProblemSummary):
     def _set_conditions(self, first: State, last: State | FrameGoal) -> None:
         """Set the boundary data and the conditions at nodes, from both ends and the via points."""
         coordinates, limits = self.coordinates, self.limits
-        start, at_end = first.on(coordinates, "start"), limits and limits.at_ends[1]
-        passed = ViaPoints.of(self.via, self.grid, coordinates, start[0], limits)
-        near = passed.holds[-1].q if passed.holds else start[0]
+        start, at_end = first.on(coordinates, "start")[0], limits and limits.at_ends[1]
+        passed = ViaPoints.of(self.via, self.grid, coordinates, start, limits)
+        near = passed.holds[-1].q if passed.holds else start
         free = (*first.free, *(joint for scene in self.scenes for joint in scene.passive))
         end = goal_state(last, "goal", coordinates, near, at_end, free)
         last_node = self.grid.intervals, float(self.grid.t[-1])
@@ -119,11 +118,11 @@ class TrajectoryProblem(ProblemSummary):
         unreachable = end.reason or passed.reason
         object.__setattr__(self, "equations", (*equations, *passed.equations))
         object.__setattr__(self, "holds", passed.holds)
-        self._set_ends(first, end.state, start)
-        if self.about_robot and not self.periodic:
-            known = self.scene, self.boundary, self.free_ends
+        self._set_ends(first, end.state)
+        if self.about_robot and not self.periodic and self.ld.k > 1:
+            known = self.scene, self.ends, self.free_ends
             unreachable = unreachable or free_fall_contradiction(*known, self.grid.duration)
-            independent = without_redundancy(self.scene, self.boundary[3], self.free_ends)
+            independent = without_redundancy(self.scene, self.ends, self.free_ends)
             object.__setattr__(self, "free_ends", independent)
         if limits is not None and limits.bounded.any() and not self.periodic:
             excused, refused = led_back(self.end_state(0), limits.strict)
@@ -132,33 +131,31 @@ class TrajectoryProblem(ProblemSummary):
                 object.__setattr__(self, "limits", dataclasses.replace(limits, excused=excused))
         object.__setattr__(self, "unreachable", unreachable)
         if self.clearance is not None:  # raises for missing collision shapes
-            ends = self.boundary, self.free_ends, self.grid.duration
+            ends = self.ends[0], self.free_ends, self.grid.duration
             object.__setattr__(self, "clearance", with_gaps(self.robot, self.clearance, *ends))
 
     def end_state(self, end: int) -> EndState:
         """The start, 0, or the goal, 1, with its limits."""
         assert self.limits is not None
-        jet = [x[end] for x in self.end_jets] or list(self.boundary[2 * end :][:2])
+        jet = [x[end] for x in self.ends]
         T, ends, limits = self.grid.duration, self.limits.ends, self.limits.at_ends[end]
         span = (ends[0] if end == 0 else T - ends[-1]) if ends else T
         scene = self.scenes[-end] if self.about_robot else None
         known = self.coordinates, limits, jet, ~self.free_ends[end], span, self.limits.window * span
         return EndState.of(*known, scene, end * T)
 
-    def _set_ends(self, start: State, goal: State, at_start: tuple[Array, Array]) -> None:
-        """Set what both ends prescribe and leave free. at_start: q and v there."""
+    def _set_ends(self, start: State, goal: State) -> None:
+        """Set what both ends prescribe and leave free."""
         coordinates, k = self.coordinates, self.ld.k
         named = (start, "start"), (goal, "goal")
         free = [state.free_on(coordinates, name, k) for state, name in named]
         for state, name in named:
             state.require_order(k, name)
-        object.__setattr__(self, "end_jets", ())
-        if k != 2:
-            jets = [state.jet_on(coordinates, name)[:k] for state, name in named]
-            object.__setattr__(self, "end_jets", tuple(map(np.stack, zip(*jets, strict=True))))
-        object.__setattr__(self, "boundary", (*at_start, *goal.on(coordinates, "goal")))
+        jets = [state.jet_on(coordinates, name)[:k] for state, name in named]
+        object.__setattr__(self, "ends", tuple(map(np.stack, zip(*jets, strict=True))))
         object.__setattr__(self, "free_ends", np.stack(free))
-        stops = [self.boundary[0], *(each.q for each in self.holds), self.boundary[2]]
+        q0, q1 = self.ends[0]
+        stops = [q0, *(each.q for each in self.holds), q1]
         object.__setattr__(self, "turns", turns_to(goal, start, coordinates, stops))
 
     @classmethod
@@ -233,44 +230,32 @@ class TrajectoryProblem(ProblemSummary):
 
     def path(self, curve: Curve) -> DiscretePath:
         """A curve sampled on the grid, with the problem's data in fixed components."""
-        ends = curve(np.array([0.0, self.grid.duration]))[: self.ld.k]
-        if self.ld.k == 2:
-            path = path_on_grid(curve, self.grid, self.ends(*ends), self.coordinates)
-        else:
-            path = path_of_any_order(curve, self.grid, self._with_fixed(ends), self.coordinates)
+        ends = self._with_fixed(curve(np.array([0.0, self.grid.duration]))[: self.ld.k])
+        path = path_on_grid(curve, self.grid, ends, self.coordinates)
         return holding(path, self.grid, self.holds)
 
     def moved(self, path: DiscretePath) -> DiscretePath:
         """A path plus the cubic, or Hermite polynomial, that moves its ends to the problem's."""
-        if self.ld.k == 2:
-            return self._moved(path, self.ends(path.q, path.v))
         ends = [x[[0, -1]] for x in (path.q, *np.moveaxis(path.rates, 1, 0))]
         return self._moved(path, self._with_fixed(ends))
 
     def moved_to_guesses(self, path: DiscretePath) -> DiscretePath:
         """As `moved`, with the problem's own initial guesses in free components, too."""
-        return self._moved(path, self.boundary if self.ld.k == 2 else self.end_jets)
+        return self._moved(path, self.ends)
 
-    def _moved(self, path: DiscretePath, ends: Any) -> DiscretePath:
-        move: Any = moved if self.ld.k == 2 else moved_any
-        return holding(move(path, self.grid, ends, self.coordinates), self.grid, self.holds)
+    def _moved(self, path: DiscretePath, ends: Ends) -> DiscretePath:
+        return holding(moved(path, self.grid, ends, self.coordinates), self.grid, self.holds)
+
+    def _with_fixed(self, ends: Ends) -> tuple[Array, ...]:
+        """Two ends with the problem's own data in fixed components."""
+        return with_fixed(self.coordinates, ends, self.ends, self.free_ends, self.periodic)
 
     def guess(self, name: str) -> DiscretePath:
         """The guess with a name; for orders other than 2 always the Hermite polynomial."""
-        T = self.grid.duration
+        known = self.coordinates, self.ends, self.grid.duration
         if self.holds:
-            jets = self.end_jets if self.ld.k != 2 else (self.boundary[::2], self.boundary[1::2])
-            return self.path(curve_through(name, self.coordinates, jets, self.holds, T))
-        if self.ld.k != 2:
-            return self.path(polynomial(self.coordinates, self.end_jets, T, self.turns))
-        curve = named_curve(name, self.coordinates, self.boundary, T)
-        if self.turns.any():
-            curve = with_turns(curve, self.coordinates, T, self.turns)
-        return self.path(curve)
-
-    def _with_fixed(self, ends: Sequence[Array]) -> list[Array]:
-        """(q, q', ..., q^(k-1)) of two ends, with the problem's own in fixed components."""
-        return with_fixed(self.coordinates, ends, self.end_jets, self.free_ends, self.periodic)
+            return self.path(curve_through(name, *known, self.holds))
+        return self.path(named_curve(name, *known, self.turns))
 
     def trajectory(self, path: DiscretePath) -> Trajectory:
         """A path on the grid as a trajectory without momenta, for sampling."""
@@ -290,26 +275,30 @@ class TrajectoryProblem(ProblemSummary):
         none = StoredTorque.none(self.grid.intervals)
         return Trajectory(self.grid, path, momenta, None, metadata, none, turns=turns)
 
-    def ends(self, q: Array, v: Array) -> Boundary:
-        """The boundary data, with free components from the ends of q (M, nq) and v (M, nv)."""
-        q0, v0, q1, v1 = self.boundary
-        if not self._has_free_ends:
-            return self.boundary
-        on, free = self.coordinates, self.free_ends
-        changes = on.difference(q0, q[0]), on.difference(q1, q[-1])
-        free_q0, free_q1 = np.where(free[:, 0], changes, 0.0)
-        q = np.stack([on.integrate(q0, free_q0), on.integrate(q1, free_q1)])
-        v = np.where(free[:, 1], v[[0, -1]], np.stack([v0, v1]))
-        if self.periodic:
-            return q[0], v[0], q[0] + (q1 - q0), v[0]
-        return q[0], v[0], q[1], v[1]
+    @property
+    def end_velocities(self) -> Array:
+        """v at the start and at the goal, shape (2, nv); zero for order 1."""
+        return self.ends[1] if self.ld.k > 1 else np.zeros((2, self.coordinates.nv))
+
+    @property
+    def boundary(self) -> tuple[Array, ...]:
+        """(q0, v0, q1, v1); use `ends`, which has more derivatives for higher orders."""
+        warn("`boundary` is now `ends`, k arrays of two rows: use it.", DeprecationWarning)
+        (q0, q1), (v0, v1) = self.ends[0], self.end_velocities
+        return q0, v0, q1, v1
+
+    @property
+    def end_jets(self) -> tuple[Array, ...]:
+        """`ends`, for orders other than 2."""
+        warn("`end_jets` is now `ends`, of every order: use it.", DeprecationWarning)
+        return () if self.ld.k == 2 else self.ends
 
     @cached_property
     def inertial_torque(self) -> float:
         """max diag M(q0)/T^2, in [N m] or [N]: torque scale of a motion by 1 rad or 1 m, or 0."""
         if not self.about_robot:
             return 0.0
-        mass = MassMatrix(self.scene.model)(self.boundary[0][None])[0]
+        mass = MassMatrix(self.scene.model)(self.ends[0][:1])[0]
         return float(np.max(np.diag(mass))) / self.grid.duration**2
 
     @property

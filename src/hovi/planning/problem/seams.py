@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 import numpy.typing as npt
 
 from hovi.discrete.grid import DiscretePath, Grid
-from hovi.discrete.guess import Curve, joined, named_curve
+from hovi.discrete.guess import Curve, Ends, joined, named_curve
 from hovi.discrete.interval_paths import path_of_order, regularized_nodes
-from hovi.discrete.path_of_any_order import hermite
 from hovi.planning.conditions.condition import Equation, equation
 from hovi.planning.problem.goals import Via, goal_state, via_differences
 from hovi.planning.problem.limits import Limits
@@ -114,13 +113,12 @@ def holding(path: DiscretePath, grid: Grid, holds: Sequence[Hold]) -> DiscretePa
 
 
 def curve_through(
-    name: str, coordinates: Coordinates, ends: Sequence[Any], holds: Sequence[Hold], duration: float
+    name: str, coordinates: Coordinates, ends: Ends, duration: float, holds: Sequence[Hold]
 ) -> Curve:
     """The initial guess with a name between all neighbouring seams and ends.
 
     A free velocity at a seam is the mean one of the motion between its neighbours, and zero where
     it would reverse. For orders other than 2 the Hermite polynomials between them.
-    ends: (q, q', ..., q^(k-1)) at the start and at the goal, two rows each.
     duration: T, in [s].
     """
     times = np.array([0.0, *(each.time for each in holds), duration])
@@ -135,8 +133,5 @@ def curve_through(
     nodes[1:-1, 1][free] = mean[free]
     pieces = []
     for (one, other), T in zip(pairwise(nodes), np.diff(times), strict=True):
-        boundary = (one[0], one[1], other[0], other[1])
-        smooth = len(one) > 2
-        piece = hermite(np.stack([one, other]), T) if smooth else None
-        pieces.append(piece or named_curve(name, coordinates, boundary, T))
+        pieces.append(named_curve(name, coordinates, [*np.stack([one, other], axis=1)], T))
     return joined(pieces, times[:-1])

@@ -68,6 +68,6 @@ def _turns_left(problem: TrajectoryProblem, guess: Trajectory) -> Array:
     if not (isinstance(goal, State) and _says_turns(problem)):
         return np.zeros(on.nv)
     first, last = guess.positions([0.0, guess.duration])
-    q0, q1 = problem.end_jets[0] if problem.end_jets else problem.boundary[::2]
+    q0, q1 = problem.ends[0]
     change = on.difference(q0, guess.q[0]) + last - first + on.difference(guess.q[-1], q1)
     return turns_after(goal, start, on, q0, change)

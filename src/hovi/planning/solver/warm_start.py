@@ -6,6 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.discrete.grid import DiscretePath
+from hovi.discrete.guess import Ends
 from hovi.optimize.banded_model import BandModel
 from hovi.optimize.quadratic_model import QuadraticModel
 from hovi.planning.problem.problem import TrajectoryProblem
@@ -39,7 +40,7 @@ def follow(
     factor = model.factor(0.0)
     if factor is None:
         return problem.moved(solved)
-    ends = _ends(problem)
+    ends = problem.ends
     change = _columns(objective, solved, ends)
     residual, ends_of = np.zeros_like(change), [0, -1]  # the only intervals with fixed columns
     hessian = model.intervals.hessian[ends_of]
@@ -51,15 +52,7 @@ def follow(
     return _with_ends(objective.moved(solved, change), ends)
 
 
-def _ends(problem: TrajectoryProblem) -> list[Array]:
-    """(q, q', ..., q^(k-1)) of both ends, k arrays of two rows."""
-    if problem.ld.k != 2:
-        return list(problem.end_jets)
-    q0, v0, q1, v1 = problem.boundary
-    return [np.array([q0, q1]), np.array([v0, v1])]
-
-
-def _columns(objective: ActionObjective, old: DiscretePath, ends: list[Array]) -> Array:
+def _columns(objective: ActionObjective, old: DiscretePath, ends: Ends) -> Array:
     """Change of the intervals' columns where the end nodes alone are moved, shape (N, m, n)."""
     problem = objective.problem
     h, k = problem.grid.steps[[0, -1]], problem.ld.k
@@ -72,7 +65,7 @@ def _columns(objective: ActionObjective, old: DiscretePath, ends: list[Array]) -
     return change
 
 
-def _with_ends(path: DiscretePath, ends: list[Array]) -> DiscretePath:
+def _with_ends(path: DiscretePath, ends: Ends) -> DiscretePath:
     """A path with exactly these ends, which it has but for rounding errors."""
     for mine, new in zip((path.q, path.v), ends, strict=False):
         mine[[0, -1]] = new

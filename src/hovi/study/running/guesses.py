@@ -13,7 +13,8 @@ import numpy.typing as npt
 
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import DiscretePath, Grid
-from hovi.discrete.guess import moved, path_on_grid, stretched
+from hovi.discrete.guess import stretched
+from hovi.discrete.path_on_grid import moved, path_on_grid
 from hovi.discrete.state import State
 from hovi.discrete.trajectory import Trajectory
 from hovi.discrete.trajectory_file import read_arrays, require_unchanged, schemes_of
@@ -96,14 +97,14 @@ class GuessCosts:
         scene, grid, path = task.planned_scene, guess.grid, guess.path
         try:
             robot = scene.robot
-            ends = _end(task.start, guess, 0, robot), _end(task.goal, guess, -1, robot)
-            boundary = *ends[0], *ends[1]
+            each = _end(task.start, guess, 0, robot), _end(task.goal, guess, -1, robot)
+            ends = [np.stack(pair) for pair in zip(*each, strict=True)]
             T = guess.duration if isinstance(task.duration, tuple) else task.duration
             if guess.duration != T:
                 grid = grid.stretched(T)
-                path = path_on_grid(stretched(guess, T), grid, boundary, scene.robot)
+                path = path_on_grid(stretched(guess, T), grid, ends, scene.robot)
             action = self._on(scene.effort_lagrangian(task.options.weight), grid)
-            cost = action.values(moved(path, grid, boundary, scene.robot)).sum()
+            cost = action.values(moved(path, grid, ends, scene.robot)).sum()
         except HoviError:
             return np.inf
         return float(cost) if np.isfinite(cost) else np.inf

@@ -169,7 +169,7 @@ def test_a_step_keeps_fixed_ends_and_fits_its_grid(two_link: hovi.Robot, kind: s
     x = bumped(objective, problem)
     T = x.duration
     assert pytest.approx(np.exp(0.2) * problem.grid.duration) == T
-    q0, v0, q1, v1 = problem.boundary
+    (q0, q1), (v0, v1) = problem.ends
     np.testing.assert_allclose(x.path.v[[0, -1]], [v0, v1], rtol=1e-13)
     np.testing.assert_allclose(x.path.q[[0, -1]], [q0, q1], rtol=1e-13)
     final = problem.on(problem.grid.stretched(T))

@@ -55,7 +55,7 @@ def swing_up(
 def first_guess(problem: hovi.TrajectoryProblem, seed: int) -> DiscretePath:
     """The cubic with a bump, from which swing-ups end in the cheaper of their minima."""
     on, T = problem.coordinates, problem.grid.duration
-    return problem.path(with_bump(cubic(on, problem.boundary, T), on, T, seed))
+    return problem.path(with_bump(cubic(on, problem.ends, T), on, T, seed))
 
 
 @cache
@@ -66,7 +66,9 @@ def continuous_optimum(scene: str) -> Extremal:
     p, p_tilde = motion.momenta.transpose(1, 2, 0)
     guess = np.concatenate([motion.q.T, motion.v.T, p, p_tilde])
     model, passive = problem.scene.model, problem.passive
-    return extremal(model, problem.boundary, motion.t, guess, 1e-8, passive)
+    return extremal(
+        model, [x[i] for i in (0, 1) for x in problem.ends], motion.t, guess, 1e-8, passive
+    )
 
 
 def samples(solution: hovi.Solution, per_interval: int = 9) -> tuple[np.ndarray, np.ndarray]:

@@ -67,9 +67,9 @@ def test_each_leg_has_its_ends_its_limits_and_what_acts_in_it() -> None:
     for leg, v in zip(legs, (4.0, 5.0, 6.0), strict=True):
         assert isinstance(leg.problem.limits, Limits)
         np.testing.assert_allclose(leg.problem.limits.upper[1], v)
-    np.testing.assert_allclose(legs[0].problem.boundary[2], MIDDLE)
-    np.testing.assert_allclose(legs[1].problem.boundary[1], [0.5, -0.5])
-    np.testing.assert_allclose(legs[2].problem.boundary[3], 0.0)
+    np.testing.assert_allclose(legs[0].problem.ends[0][1], MIDDLE)
+    np.testing.assert_allclose(legs[1].problem.ends[1][0], [0.5, -0.5])
+    np.testing.assert_allclose(legs[2].problem.ends[1][1], 0.0)
     assert legs[1].problem.scene is scenes()[1] or len(legs[1].problem.scene.effects) == 2
 
 

@@ -35,8 +35,8 @@ def held_still_at(problem: TrajectoryProblem, limits: Limits, end: int) -> Itera
     here = limits.at_ends[end]
     if not problem.about_robot or not any(each.bounded[3].any() for each in limits.at_ends):
         return
-    if not problem.free_ends[end].any() and not problem.boundary[2 * end + 1].any():
-        scene, q = problem.scenes[-end], problem.boundary[2 * end]
+    if not problem.free_ends[end].any() and not problem.end_velocities[end].any():
+        scene, q = problem.scenes[-end], problem.ends[0][end]
         tau = _static(scene, q[None], end * problem.grid.duration)
         yield from _excess(problem, scene, tau, here, f"at the {('start', 'goal')[end]}")
     goal = problem.goal
@@ -87,7 +87,7 @@ def _accelerations(problem: TrajectoryProblem, limits: Limits, end: int) -> tupl
     """The smallest and largest accelerations at an end, (nv,)."""
     low, high = limits.lower[2].copy(), limits.upper[2].copy()
     if problem.ld.k > 2:
-        held, given = ~problem.free_ends[end, 2], problem.end_jets[2][end]
+        held, given = ~problem.free_ends[end, 2], problem.ends[2][end]
         low[held], high[held] = given[held], given[held]
     return low, high
 
@@ -96,7 +96,7 @@ def _torques(
     problem: TrajectoryProblem, scene: Scene, end: int, low: Array, high: Array
 ) -> tuple[Array, Array]:
     """Bounds of the torques at an end, shape (nv,), for accelerations between two."""
-    q, v = problem.boundary[2 * end][None], problem.boundary[2 * end + 1][None]
+    q, v = problem.ends[0][end][None], problem.end_velocities[end][None]
     t = np.array([end * problem.grid.duration])
     if (low == high).all():
         tau = scene.inverse_dynamics(q, v, low[None], t)[0]
@@ -126,7 +126,7 @@ def _static(scene: Scene, q: Array, time: float) -> Array:
 
 def _at_frame_goal(problem: TrajectoryProblem, goal: FrameGoal, limits: Limits) -> Iterator[str]:
     """The goal, if no configuration found for it can be held still."""
-    scene, near = problem.scenes[-1], problem.boundary[2]
+    scene, near = problem.scenes[-1], problem.ends[0][1]
     bounds = limits.lower[0], limits.upper[0]
     found = find_branches(scene.robot, goal, near, bounds, BRANCHES, SEEDS).q
     if len(found) == 0:

@@ -60,7 +60,7 @@ def about_limits(
         for end in (0, 1):
             what = "the motion has to begin or end with an acceleration there, and may not exist"
             if problem.ld.k > 2 and not problem.free_ends[end, 2].any():
-                if problem.end_jets[2][end].any():
+                if problem.ends[2][end].any():
                     continue  # `contradiction` knows its torque
                 what = "its acceleration has to be zero there, so that probably no motion exists"
             warnings += [
@@ -79,7 +79,7 @@ def slips(problem: TrajectoryProblem) -> list[str]:
     """Sentences about what looks like other units: lengths, angles, durations, masses, gravity."""
     states = [(x.goal, x.name) for x in _via(problem) if isinstance(x.goal, State)]
     inner = [state.on(problem.robot, name)[0] for state, name in states]
-    q = [problem.boundary[0], *inner]
-    ends = [] if isinstance(problem.goal, FrameGoal) else [problem.boundary[2]]
+    q = [problem.ends[0][0], *inner]
+    ends = [] if isinstance(problem.goal, FrameGoal) else [problem.ends[0][1]]
     lengths = length_slips(problem.scene, problem.clearance or Clearance(), [*q, *ends])
     return [*lengths, *long_durations(problem), *heavy_loads(problem.scene)]

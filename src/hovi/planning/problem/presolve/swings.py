@@ -37,7 +37,7 @@ def too_many_swings(problem: TrajectoryProblem) -> str:
     if T < LONG or not supported or problem.ld.segments is not None or problem.via:
         return ""
     at_rest = _Static(problem)
-    first, last = problem.boundary[0], problem.boundary[2]
+    first, last = problem.ends[0]
     states = [at_rest.least(q) for q in (first, last, first / 2 + last / 2)]
     least = min(at_rest.cost(q)[0] for q in states)
     ends = max(at_rest.cost(first)[0], at_rest.cost(last)[0])

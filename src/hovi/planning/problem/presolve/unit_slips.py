@@ -33,7 +33,7 @@ def long_durations(problem: TrajectoryProblem) -> Iterator[str]:
     speed = np.where(given > 0.0, np.minimum(given, PLAUSIBLE_SPEED), PLAUSIBLE_SPEED)
     if limits is not None:
         speed = np.minimum(speed, limits.at_ends[0].upper[1])
-    distance = np.abs(robot.difference(problem.boundary[0], problem.boundary[2]))
+    distance = np.abs(robot.difference(*problem.ends[0]))
     moving = distance > 0.0
     if not moving.any():
         return

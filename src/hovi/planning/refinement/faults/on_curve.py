@@ -71,7 +71,7 @@ def fault_of_period(solution: Solution) -> str:
     i = int(np.argmax(jump))
     if jump[i] <= RESOLVED * largest:
         return ""
-    held = problem.boundary[0][i]
+    held = problem.ends[0][0][i]
     return (
         f"{problem.coordinates.coordinate_names[i]!r} is held at {held:.4g} by a force, since its "
         f"momentum jumps from {p[-1, 0, i]:.4g} to {p[0, 0, i]:.4g} after a period, as at a point "

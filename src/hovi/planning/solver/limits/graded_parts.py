@@ -42,7 +42,7 @@ class GivenEnds:
     @classmethod
     def of(cls, problem: TrajectoryProblem) -> GivenEnds:
         """Those of a problem."""
-        pairs = list(problem.end_jets) or [np.stack(x) for x in _pairs(problem)]
+        pairs = list(problem.ends)
         pairs[0] = problem.coordinates.space.coordinates(pairs[0])
         return cls(np.stack(pairs, axis=1), ~problem.free_ends)
 
@@ -57,11 +57,6 @@ class GivenEnds:
                 for i in range(min(len(rates), degree + 1))
             ]
         )
-
-
-def _pairs(problem: TrajectoryProblem) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
-    q0, v0, q1, v1 = problem.boundary
-    return (q0, q1), (v0, v1)
 
 
 def graded(

@@ -68,8 +68,8 @@ def _within(problem: TrajectoryProblem, time: float) -> Braking | None:
 
 
 def _to_rest(problem: TrajectoryProblem, time: float) -> Curve:
-    (q0, v0), k = problem.boundary[:2], problem.ld.k
-    a0 = problem.end_jets[2][0] if k > 2 else -2.0 * v0 / time
+    q0, v0, k = problem.ends[0][0], problem.end_velocities[0], problem.ld.k
+    a0 = problem.ends[2][0] if k > 2 else -2.0 * v0 / time
     # v = v0 + a0 time s + (-3 v0 - 2 a0 time) s^2 + (2 v0 + a0 time) s^3
     v = np.stack([v0, a0 * time, -3.0 * v0 - 2.0 * a0 * time, 2.0 * v0 + a0 * time])
     powers = np.arange(4.0)[:, None]

@@ -69,7 +69,7 @@ def as_start(given: End, problem: TrajectoryProblem) -> State:
     robot, limits = problem.robot, problem.limits
     start.check(robot)
     bounds = position_bounds(robot, "none" if limits is None else limits.at_ends[0])
-    near = problem.boundary[0] if start.guess is None else None
+    near = problem.ends[0][0] if start.guess is None else None
     first = first_configuration(robot, start, near, bounds)
     q = configurations(robot, start, first, bounds, problem.clearance or Clearance())[0]
     return State(q, free_velocity=tuple(start.free_velocity))

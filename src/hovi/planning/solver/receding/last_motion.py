@@ -101,7 +101,7 @@ def _miss(problem: TrajectoryProblem, path: DiscretePath, end: int, verb: str) -
     """
     on, k = problem.coordinates, problem.ld.k
     place, found = (0, -1)[end], []
-    wanted = [x[end] for x in problem.end_jets] if k != 2 else list(problem.boundary[2 * end :][:2])
+    wanted = [x[end] for x in problem.ends]
     given = [path.q[place], *path.rates[place]]
     for i in range(k):
         change = on.difference(wanted[0], given[0]) if i == 0 else given[i] - wanted[i]

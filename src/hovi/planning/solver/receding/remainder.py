@@ -13,9 +13,8 @@ import numpy.typing as npt
 
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import DiscretePath, Grid
-from hovi.discrete.guess import path_on_grid
 from hovi.discrete.interval_paths import path_of_order, scaled_data
-from hovi.discrete.path_of_any_order import path_of_any_order
+from hovi.discrete.path_on_grid import path_on_grid
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.limits.limit_rows import LimitRows
 from hovi.robot.space.configuration_space import ConfigurationSpace
@@ -172,11 +171,9 @@ class Remainder:
         def curve(t: Array) -> tuple[Array, ...]:
             return motion.jet(np.minimum(t + self.time, motion.duration))
 
-        q, v, _ = curve(np.zeros(1))
-        if path.order == 2:
-            short = path_on_grid(curve, grid, (q[0], v[0], path.q[end], path.v[end]), on)
-        else:
-            short = path_of_any_order(curve, grid, [np.stack([q[0], path.q[end]])], on)
+        jet, last = curve(np.zeros(1)), (path.q[end], path.v[end])
+        ends = [np.stack([x[0], y]) for x, y in zip(jet, last, strict=False)]
+        short = path_on_grid(curve, grid, ends[: path.order], on)
         modes = path.inner.shape[1] - short.inner.shape[1]
         inner = np.pad(short.inner, ((0, 0), (0, modes), (0, 0)))
         return DiscretePath(short.q, short.v, short.z, inner, short.higher)

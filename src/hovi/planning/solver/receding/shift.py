@@ -13,8 +13,7 @@ import numpy as np
 
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import DiscretePath, Grid
-from hovi.discrete.guess import path_on_grid
-from hovi.discrete.path_of_any_order import path_of_any_order
+from hovi.discrete.path_on_grid import path_on_grid
 from hovi.discrete.state import State
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError
@@ -95,10 +94,7 @@ class Shift:
             return tuple(x / ratio**j for j, x in enumerate(jet))
 
         ends = curve(np.array([0.0, self.duration]))
-        if k != 2:
-            return path_of_any_order(curve, self.grid, ends[:k], on)
-        q, v, _ = ends
-        return path_on_grid(curve, self.grid, (q[0], v[0], q[1], v[1]), on)
+        return path_on_grid(curve, self.grid, ends[:k], on)
 
     def first_state(self, path: DiscretePath, motion: Trajectory) -> State:
         """The state in which the rest of a path starts, with the full turns of a whole motion."""
