@@ -15,12 +15,11 @@ from hovi.discrete.instants import InstantBatch, Instants
 from hovi.discrete.state import State
 from hovi.errors import InputError
 from hovi.planning.problem.problem import TrajectoryProblem
-from hovi.planning.solver.action_objective import ActionObjective
-from hovi.planning.solver.solver import guess_path
 from hovi.robot.loading import load_robot
 from hovi.scene.lagrangian import PointTerms
 from hovi.scene.scene import Scene
 from hovi.schemes import by_name, galerkin
+from oracles.path_steps import moved, random_step
 from samples.manifold_robots import BASES, chain, configurations, with_arm
 
 Array = npt.NDArray[np.float64]
@@ -57,12 +56,9 @@ def problem_of(name: str, grid: Grid, instants: Instants | None = WHERE) -> Traj
     return TrajectoryProblem(ld, State(q0, v0), State(q1, v1))
 
 
-def wavy(problem: TrajectoryProblem) -> tuple[DiscretePath, ActionObjective]:
+def wavy(problem: TrajectoryProblem) -> DiscretePath:
     """The cubic guess with nodes and inner modes displaced at random."""
-    objective = ActionObjective(problem)
-    x = guess_path(problem, "cubic")
-    model = objective.model(x, None, None)
-    return objective.retract(x, 0.1 * model.random_vector(5), model), objective
+    return moved(problem, problem.guess("cubic"), 0.1 * random_step(problem, 5))
 
 
 def random_forces(problem: TrajectoryProblem, seed: int = 0) -> list[PointTerms]:
@@ -94,7 +90,7 @@ def work(problem: TrajectoryProblem, path: DiscretePath, reference: DiscretePath
 @each_robot
 def test_jets_at_instants_are_those_of_the_trajectory(name: str, grid: Grid) -> None:
     problem = problem_of(name, grid)
-    path, _ = wavy(problem)
+    path = wavy(problem)
     *_, found = problem.ld.jets(path)
     expected = problem.trajectory(path).jet_intervals(WHERE.intervals, WHERE.positions)
     for one, other in zip(found, expected, strict=True):
@@ -111,7 +107,7 @@ def test_jets_at_instants_are_those_of_the_trajectory(name: str, grid: Grid) -> 
 @pytest.mark.parametrize("name", ["vector space", "continuous"])
 def test_displacements_at_instants_lead_to_the_configurations_there(name: str, grid: Grid) -> None:
     problem = problem_of(name, grid)
-    path, _ = wavy(problem)
+    path = wavy(problem)
     batch = InstantBatch(grid, WHERE.intervals, WHERE.positions, WHERE.weights)
     found = problem.coordinates.integrate(path.q[WHERE.intervals], batch.displacements(path))
     q = problem.trajectory(path).jet_intervals(WHERE.intervals, WHERE.positions)[0]
@@ -123,7 +119,7 @@ def test_jets_at_instants_are_those_of_the_trajectory_for_other_orders(order: in
     grid = Grid(STEPS, (galerkin(2, order),) * 4)
     ld = DiscreteLagrangian(hovi.spline(2, order), grid, WHERE)
     problem = TrajectoryProblem(ld, State([0.0, 0.1]), State([1.0, -0.5]))
-    path = guess_path(problem, "cubic")
+    path = problem.guess("cubic")
     random = np.random.default_rng(order)
     path = dataclasses.replace(path, inner=random.normal(size=path.inner.shape))
     *_, found = ld.jets(path)
@@ -138,7 +134,7 @@ def test_jets_at_instants_are_those_of_the_trajectory_for_other_orders(order: in
 @each_robot
 def test_instants_have_no_part_in_the_cost(name: str, grid: Grid) -> None:
     problem, plain = problem_of(name, grid), problem_of(name, grid, None)
-    path, _ = wavy(plain)
+    path = wavy(plain)
     assert problem.ld.action(path) == plain.ld.action(path)
     np.testing.assert_array_equal(problem.ld.values(path), plain.ld.values(path))
     one, other = problem.ld.expand(path), plain.ld.expand(path)
@@ -152,28 +148,29 @@ def test_instants_have_no_part_in_the_cost(name: str, grid: Grid) -> None:
 @each_grid
 @each_robot
 def test_gradients_with_forces_at_instants_match_differences(name: str, grid: Grid) -> None:
-    """Of the action and the forces' work, in the solver's own unknowns."""
+    """Of the action and the forces' work, in the free unknowns of a path."""
     problem = problem_of(name, grid)
-    path, objective = wavy(problem)
-    model = objective.model_with(path, None, random_forces(problem))
+    path = wavy(problem)
+    gradient = problem.ld.expand(path, terms=random_forces(problem)).gradient
     for seed in range(3):
-        step = model.random_vector(seed)
+        step = random_step(problem, seed)
 
         def value(share: float, step: Array = step) -> float:
-            moved = objective.retract(path, share * step, model)
-            return problem.ld.action(moved) + work(problem, moved, path)
+            there = moved(problem, path, share * step)
+            return problem.ld.action(there) + work(problem, there, path)
 
         h = 1e-3
         slope = (8 * (value(h) - value(-h)) - (value(2 * h) - value(-2 * h))) / (12 * h)
-        assert float(np.vdot(model.gradient, step)) == pytest.approx(slope, rel=1e-6)
+        assert float(np.vdot(gradient, step)) == pytest.approx(slope, rel=1e-6)
 
 
 @each_robot
 def test_weights_at_instants_are_squares_in_the_hessian(name: str) -> None:
     """With the same curvature of torques, the Hessian gains sum w sigma (dy)^2."""
     problem = problem_of(name, GRIDS["mixed schemes"])
-    path, objective = wavy(problem)
-    curvature = [objective.output_slope(y, i) for i, y in enumerate(objective.outputs(path))]
+    path, ld = wavy(problem), problem.ld
+    parts = zip(ld.lagrangians, ld.jets(path), ld.point_times, strict=True)
+    curvature = [L.output_slope(L.output(*jet, t=t)) for L, jet, t in parts]
     assert not curvature[-1].any()
     none = random_forces(problem)
     none = [PointTerms(*(np.zeros_like(x) for x in dataclasses.astuple(t)[:4])) for t in none]
@@ -182,20 +179,18 @@ def test_weights_at_instants_are_squares_in_the_hessian(name: str) -> None:
     sigma = random.uniform(size=last.jet_gradient.shape)
     on_tau = np.zeros(last.output_gradient.shape)  # torques have no rows
     weighted = [*none[:-1], PointTerms(last.jet_gradient, sigma, last.output_gradient, on_tau)]
-    plain = objective.model_with(path, curvature, none)
-    step = plain.random_vector(4)
-    with_squares = objective.model_with(path, curvature, weighted)
-    local = plain.gather(step)
+    step = random_step(problem, 4)
 
-    def square(hessian: Array) -> float:
-        return float(np.einsum("kia,kijab,kjb->", local, hessian, local, optimize=True))
+    def square(terms: list[PointTerms]) -> float:
+        hessian = ld.expand(path, multipliers=curvature, terms=terms).hessian
+        return float(np.einsum("kia,kijab,kjb->", step, hessian, step, optimize=True))
 
-    gained = square(with_squares.intervals.hessian) - square(plain.intervals.hessian)
+    gained = square(weighted) - square(none)
     h, k, s = 1e-4, WHERE.intervals, WHERE.positions
 
     def sampled(share: float) -> Array:
-        moved = objective.retract(path, share * step, plain)
-        q, v, a, tau = problem.trajectory(moved).sample_intervals(k, s)
+        there = moved(problem, path, share * step)
+        q, v, a, tau = problem.trajectory(there).sample_intervals(k, s)
         origin = problem.trajectory(path).sample_intervals(k, s).q
         space = problem.ld.lagrangian.space
         dq = q - origin if space is None else space.difference(origin, q)
@@ -208,39 +203,27 @@ def test_weights_at_instants_are_squares_in_the_hessian(name: str) -> None:
 
 @each_robot
 def test_momenta_with_forces_at_instants_are_derivatives(name: str) -> None:
-    """D1 .. D4, and the gradient in the inner modes, are that of the model in any step."""
+    """D1 .. D4, and the gradient in the inner modes, are that of the expansion in any step."""
     problem = problem_of(name, GRIDS["one scheme"])
-    path, objective = wavy(problem)
+    path = wavy(problem)
     forces, ld = random_forces(problem), problem.ld
-    model = objective.model_with(path, None, forces)
+    gradient = ld.expand(path, terms=forces).gradient
     d = ld.derivatives(path, forces)
     np.testing.assert_allclose(
         ld.momenta(path, forces), np.concatenate([-d[:, :2], d[-1:, 2:]]), rtol=1e-14
     )
     for seed in range(3):
-        step = model.random_vector(seed)
-        local = model.gather(step)
-        ends = local[:, :4] / STEPS[:, None, None] ** np.array([0, 1, 0, 1])[:, None]
-        inner = float(np.vdot(model.intervals.gradient[:, 4:], local[:, 4:]))
-        nodal = float(np.vdot(d, nodal_of(ends, objective)))
-        found = float(np.vdot(model.gradient, step))
-        assert nodal + inner == pytest.approx(found, rel=1e-9)
-
-
-def nodal_of(ends: Array, objective: ActionObjective) -> Array:
-    """Steps of (q0, v0, q1, v1) from those of an interval's columns, both (N, 4, n)."""
-    if objective.coordinates == "nodal":
-        return ends
-    h = STEPS[:, None]
-    q0, v0 = ends[:, 0], ends[:, 1]
-    Z0, Z1 = ends[:, 2], ends[:, 3] * h
-    return np.stack([q0, v0, q0 + h * v0 + Z0, v0 + Z1 / h], axis=1)
+        step = random_step(problem, seed)
+        ends = step[:, :4] / STEPS[:, None, None] ** np.array([0, 1, 0, 1])[:, None]
+        inner = float(np.vdot(gradient[:, 4:], step[:, 4:]))
+        nodal = float(np.vdot(d, ends))
+        assert nodal + inner == pytest.approx(float(np.vdot(gradient, step)), rel=1e-9)
 
 
 def test_duration_derivatives_count_the_work_at_instants() -> None:
     """S(T) with nodal q and v and inner modes scaled, with forces constant: by differences."""
     problem = problem_of("vector space", GRIDS["one scheme"])
-    path, _ = wavy(problem)
+    path = wavy(problem)
     *_, last = random_forces(problem)
     forces = random_forces(problem)
     found = problem.ld.duration_derivative(path, forces)

@@ -17,8 +17,8 @@ import scipy.sparse as sp
 from scipy.sparse.linalg import spsolve
 
 from hovi.planning.problem.problem import TrajectoryProblem
-from hovi.planning.solver.action_objective import ActionObjective
-from hovi.planning.solver.solver import guess_path
+from oracles.dense_action import DenseAction
+from oracles.path_steps import moved
 from samples.paper_arm import symbols
 
 Array = npt.NDArray[np.float64]
@@ -182,22 +182,18 @@ def solve(problem: Problem, tolerance: float = 1e-10, max_steps: int = 50) -> Ru
 
 def full_newton(problem: TrajectoryProblem, max_steps: int = 60) -> str:
     """Undamped Newton steps from the cubic guess, until one changes q and v by less than 1e-9."""
-    action = ActionObjective(problem, "tree")
-    path = guess_path(problem, "cubic")
+    path, T = problem.guess("cubic"), problem.grid.duration
     with np.errstate(all="ignore"):
         for steps in range(max_steps):
-            model = action.model_with(path, None, None)
-            size = len(model.gradient)
-            G = np.stack([model.gather(e) for e in np.eye(size)], axis=-1)  # (N, m, n, size)
-            HG = np.einsum("kijab,kjbs->kias", model.intervals.hessian, G, optimize=True)
-            H = np.tensordot(G, HG, axes=([0, 1, 2], [0, 1, 2]))
-            cost = action.value(path)
-            if not (np.isfinite(H).all() and np.isfinite(cost)):
+            action, cost = DenseAction(problem, path), problem.ld.action(path)
+            if not (np.isfinite(action.hessian).all() and np.isfinite(cost)):
                 return f"not finite after {steps} steps"
-            step = np.linalg.solve(H, -model.gradient)
-            if action.relative_size(path, step, model) <= 1e-9:
-                n_neg = int(np.sum(np.linalg.eigvalsh((H + H.T) / 2) < 0))
+            change = np.linalg.solve(action.hessian, -action.gradient)
+            after = moved(problem, path, action.step(change))
+            moves = np.abs(after.q - path.q).max(), T * np.abs(after.v - path.v).max()
+            if max(moves) <= 1e-9 * max(1.0, np.abs(path.q).max(), T * np.abs(path.v).max()):
+                n_neg = int(np.sum(np.linalg.eigvalsh(action.hessian) < 0))
                 return f"converged after {steps} steps, J = {cost:.4g}, n_neg = {n_neg}"
-            path = action.retract(path, step, model)
+            path = after
     largest = np.abs(path.q).max()
     return f"still running after {max_steps} steps, J = {cost:.2g}, |q| up to {largest:.2g}"

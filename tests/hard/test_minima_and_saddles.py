@@ -26,20 +26,18 @@ from hard.scenes import (
     summary,
     uneven,
 )
-from hovi import Solution, Status, plan
+from hovi import Solution, Status, plan, solve
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
-from hovi.discrete.grid import DiscretePath, Grid
-from hovi.discrete.interval_batch import Coordinates
+from hovi.discrete.grid import Grid
 from hovi.discrete.state import State
 from hovi.errors import HoviWarning
-from hovi.optimize.merge_tree import MergeTreeModel
-from hovi.optimize.quadratic_model import IntervalSum
-from hovi.planning.problem.hessian_structure import ActionStructure
+from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.task_file.reading import load_task
 from hovi.robot.bundled_models import example
 from hovi.scene.casadi_lagrangian import CasadiLagrangian
 from hovi.scene.scene import Scene
 from hovi.schemes import galerkin
+from oracles.dense_action import DenseAction
 from oracles.on_grid import solve_on_grid
 from samples.paper_arm import HANG, REACH_COST
 
@@ -269,31 +267,19 @@ CONJUGATE = {6.2: 0, 6.4: 1, 9.1: 2, 12.7: 3}
 """Horizons T and the numbers of roots of 2 - 2 cos T = T sin T below them: conjugate points."""
 
 
-def oscillator(T: float, coordinates: Coordinates = "nodal") -> tuple[ActionStructure, IntervalSum]:
-    """The expansion of the action of a^2/2 - v^2/2 over T on 64 intervals."""
+def oscillator(T: float) -> TrajectoryProblem:
+    """The action of a^2/2 - v^2/2 over T on 64 intervals, between two states at rest."""
     q, v, a = (ca.SX.sym(c, 1) for c in "qva")
     L = CasadiLagrangian([q, v, a], (ca.sumsqr(a) - ca.sumsqr(v)) / 2)
-    grid = Grid.uniform(T, 64, galerkin(2))
-    zero = DiscretePath(*np.zeros((2, 65, 1)), np.zeros((64, 2, 1)), np.zeros((64, 2, 1)))
-    structure = ActionStructure(grid, 1)
-    expansion = DiscreteLagrangian(L, grid).expand(zero, coordinates)
-    metric = structure.metric[coordinates]
-    return structure, IntervalSum(expansion.gradient, expansion.hessian, metric)
-
-
-def inertia(T: float) -> int:
-    """n_neg of that action."""
-    structure, intervals = oscillator(T, "regular")
-    return MergeTreeModel(intervals, structure.tree).negative_eigenvalues()
+    ld = DiscreteLagrangian(L, Grid.uniform(T, 64, galerkin(2)))
+    return TrajectoryProblem(ld, State([0.0]), State([0.1]))
 
 
 def naive_conjugate() -> str:
     parts = []
     for T in CONJUGATE:
-        structure, intervals = oscillator(T)
-        lower = structure.layout.assemble(intervals.hessian)
-        H = sum(np.diag(lower[: len(lower) - k, k], -k) for k in range(lower.shape[1]))
-        H = H + np.tril(H, -1).T
+        given = oscillator(T)
+        H = DenseAction(given, given.guess("cubic")).hessian
         b = np.random.default_rng(0).normal(size=len(H))
         residual = np.abs(H @ np.linalg.solve(H, b) - b).max() / np.abs(b).max()
         parts.append(f"residual {residual:.0e} at T = {T}")
@@ -301,8 +287,10 @@ def naive_conjugate() -> str:
 
 
 def conjugate_points() -> Outcome:
-    found = {T: inertia(T) for T in CONJUGATE}
-    return Outcome(", ".join(f"{n} at T = {T}" for T, n in found.items()), found == CONJUGATE)
+    found = {T: solve(oscillator(T), seek="stationary") for T in CONJUGATE}
+    shown = ", ".join(f"{s.status} with n_neg = {s.n_neg} at T = {T}" for T, s in found.items())
+    good = all(found[T].success and found[T].n_neg == count for T, count in CONJUGATE.items())
+    return Outcome(shown, good)
 
 
 CASES = (

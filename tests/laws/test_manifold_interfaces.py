@@ -11,7 +11,7 @@ import pinocchio as pin
 import pytest
 from typer.testing import CliRunner
 
-from hovi import Solution, certify, plan
+from hovi import Solution, certify, plan, solve
 from hovi.cli.application import application
 from hovi.cli.reports.peaks import peaks
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
@@ -26,7 +26,6 @@ from hovi.planning.conditions.state_difference import StateDifference
 from hovi.planning.problem.limit_violation import excess_along
 from hovi.planning.problem.limits import as_limits
 from hovi.planning.problem.problem import TrajectoryProblem
-from hovi.planning.solver.solver import guess_path
 from hovi.planning.task_file.reading import load_task
 from hovi.planning.task_file.task_plan import plan_task
 from hovi.robot.loading import load_robot
@@ -160,7 +159,7 @@ def test_a_full_rotation_needs_enough_intervals_for_its_charts() -> None:
     goal = State(q, turns={"j0": [0, 1, 0]})
     ld = DiscreteLagrangian(Scene(robot).effort_lagrangian(), Grid.uniform(2.0, 2, galerkin(2)))
     with pytest.raises(ChartError, match=r"rotates joint 'j0' by .* use \d+ or more intervals"):
-        guess_path(TrajectoryProblem(ld, State(q), goal), "cubic")
+        solve(TrajectoryProblem(ld, State(q), goal))
     solution = plan(
         Scene(robot),
         q,

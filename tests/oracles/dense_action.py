@@ -35,6 +35,7 @@ class DenseAction:
         columns = np.concatenate([self.nodes[:-1], self.nodes[1:], modes], axis=1)
         orders = np.concatenate([np.tile(np.arange(k), 2), np.zeros(m - 2 * k)])
         scales = grid.steps[:, None] ** orders
+        self._columns, self._scales = columns, scales
         size = int(count + inner.sum())
         self.gradient, self.hessian = np.zeros(size), np.zeros((size, size))
         for number, scale, g, H in zip(
@@ -55,6 +56,10 @@ class DenseAction:
         values = np.linalg.eigvalsh(H)
         assert np.abs(values).min() > 1e-9 * np.abs(values).max()
         return int((values < 0).sum())
+
+    def step(self, unknowns: Array) -> Array:
+        """A change of the unknowns in the columns of the intervals: see oracles.path_steps."""
+        return np.asarray(np.append(unknowns, 0.0)[self._columns] * self._scales[:, :, None])
 
     def newton_step(self) -> float:
         """The largest change of q and T v in a step of Newton's method, relative to them."""

@@ -9,13 +9,11 @@ import numpy as np
 import pytest
 
 from hovi import Status, plan
-from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
-from hovi.discrete.grid import DiscretePath
 from hovi.discrete.state import State
 from hovi.planning.clearance.obstacles import Sphere
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.goals import Via
-from hovi.planning.solver import action_objective
+from hovi.scene.effort_lagrangian import EffortLagrangian
 from hovi.scene.scene import Scene
 from hovi.system.interruption import (
     interrupted,
@@ -88,18 +86,18 @@ def test_an_interrupt_anywhere_ends_every_search(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Also where Python discards the exception, as in a destructor, and only the record remains."""
-    jets, calls = action_objective._jets, 0
+    output, calls = EffortLagrangian.output, 0
 
-    def interrupting(self: DiscreteLagrangian, path: DiscretePath) -> Any:
+    def interrupting(self: EffortLagrangian, *jet: Any, **more: Any) -> Any:
         nonlocal calls
         calls += 1
         if calls == evaluations:
             record_interrupt()
             if not discarded:
                 raise KeyboardInterrupt
-        return jets(self, path)
+        return output(self, *jet, **more)
 
-    monkeypatch.setattr(action_objective, "_jets", interrupting)
+    monkeypatch.setattr(EffortLagrangian, "output", interrupting)
     arguments = {"goal": REACH, "duration": 1.0, "limits": "none", "intervals": 12} | SEARCHES[
         search
     ]
