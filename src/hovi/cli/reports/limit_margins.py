@@ -9,8 +9,9 @@ from hovi.discrete.trajectory import Trajectory
 from hovi.planning.clearance.clearance import Clearance
 from hovi.planning.clearance.distances import Distances
 from hovi.planning.problem.limits import Limits
-from hovi.planning.solver.outcome import margins
-from hovi.planning.solver.outcome.margins import LimitMargins
+from hovi.planning.solver.requirements import distances
+from hovi.planning.solver.requirements import limit_margins as limited
+from hovi.planning.solver.requirements.limit_margins import LimitMargins
 from hovi.planning.solver.solver import Solution
 from hovi.planning.solver.status import Status
 from hovi.system.dataclass import dataclass
@@ -20,13 +21,13 @@ from hovi.viewing.recorded_limits import imposed_limits, kept_distances
 
 def limit_margins(motion: Solution | Trajectory) -> LimitMargins | None:
     """The margins of a motion to the limits of its plan; None without limits."""
-    return margins.limit_margins(_trajectory_of(motion), _limits_of(motion))[0]
+    return limited.limit_margins(_trajectory_of(motion), _limits_of(motion))[0]
 
 
 def nearest_pair(motion: Solution | Trajectory) -> tuple[float | None, str | None]:
     """The least distance of any pair, in [m], and that pair; None for a plan without obstacles."""
     kept = _distances_of(motion)
-    return (None, None) if kept is None else margins.nearest_pair(_trajectory_of(motion), *kept)
+    return (None, None) if kept is None else distances.nearest_pair(_trajectory_of(motion), *kept)
 
 
 @dataclass(frozen=True)
@@ -58,7 +59,7 @@ class KnownMargins:
         try:
             with deadline.in_force():
                 motion = solution.trajectory
-                limits, segments = margins.limit_margins(motion, _limits_of(solution))
+                limits, segments = limited.limit_margins(motion, _limits_of(solution))
                 violation = solution.violation if solution.problem is not None else None
                 distance, pair = nearest_pair(solution)
                 return cls(limits, distance, segments, violation, nearest_pair=pair)
@@ -86,4 +87,4 @@ def _distances_of(motion: Solution | Trajectory) -> tuple[Clearance, Distances] 
     """The clearance and distances of the solved problem, or those that the motion records."""
     if not isinstance(motion, Solution) or motion.problem is None:
         return kept_distances(_trajectory_of(motion))
-    return margins.all_distances(motion.problem)
+    return distances.all_distances(motion.problem)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from hovi.discrete.measures.segment_spans import SegmentSpan, segment_spans
-from hovi.planning.solver.outcome.margins import LimitMargins
+from hovi.planning.solver.requirements.limit_margins import LimitMargins
 from hovi.planning.solver.solver import Solution
 
 

@@ -12,7 +12,7 @@ from hovi.optimize.ended import Reason
 from hovi.planning.conditions.condition import describe, is_spurious
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.action_objective import ActionObjective
-from hovi.planning.solver.multipliers import Multipliers, Residuals
+from hovi.planning.solver.multipliers import Multipliers, Residuals, largest_residual
 from hovi.system.dataclass import dataclass
 
 INITIAL_TORQUE_PENALTY = 10.0
@@ -169,40 +169,23 @@ def spurious_sentence(problem: TrajectoryProblem, path: DiscretePath) -> str:
 
 
 def unmet_sentence(problem: TrajectoryProblem, path: DiscretePath, residuals: Residuals) -> str:
-    """As `missed_clause`, a sentence without its end that says what to do."""
+    """Passive torques if they are too large, else the goal that is missed most, and what to do.
+
+    A sentence without its end.
+    """
     if residuals.torque_share > FEASIBLE_RESIDUAL or not problem.equations:
         return (
-            f"no motion was found with zero torque at passive joint {_passive(problem)}: the "
+            f"no motion was found with zero torque at passive joint {passive_joints(problem)}: the "
             f"remaining torque is {residuals.torque_share:.3g} of the largest; allow more time or "
             "change the goal"
         )
-    t, error = _worst_condition(problem, path, residuals)
+    worst = largest_residual(problem, residuals.nodes)[0]
     return (
-        f"the goal at t = {t:.4g} s cannot be met: {error}; change the goal, increase the "
-        "duration or try another initial guess"
+        f"the goal at t = {worst.where.time:.4g} s cannot be met: {describe(worst, path)}; change "
+        "the goal, increase the duration or try another initial guess"
     )
 
 
-def missed_clause(problem: TrajectoryProblem, path: DiscretePath, residuals: Residuals) -> str:
-    """Passive torques if they are too large, else the goal that is missed most, as a clause."""
-    if residuals.torque_share > FEASIBLE_RESIDUAL or not problem.equations:
-        share = residuals.torque_share
-        return f"the torque at passive joint {_passive(problem)} is {share:.3g} of the largest"
-    t, error = _worst_condition(problem, path, residuals)
-    return f"the goal at t = {t:.4g} s is missed: {error}"
-
-
-def _passive(problem: TrajectoryProblem) -> str:
+def passive_joints(problem: TrajectoryProblem) -> str:
     """The names of the passive joints."""
     return ", ".join(repr(joint) for joint in problem.scene.passive)
-
-
-def _worst_condition(
-    problem: TrajectoryProblem, path: DiscretePath, residuals: Residuals
-) -> tuple[float, str]:
-    """The time in [s] of the condition with the largest residual, and by how much it is missed."""
-    worst = max(
-        zip(problem.equations, residuals.nodes, strict=True),
-        key=lambda pair: float(np.max(np.abs(pair[1]), initial=0.0)),
-    )[0]
-    return worst.where.time, describe(worst, path)

@@ -51,8 +51,8 @@ from hovi.planning.solver.receding.last_motion import (
     last_motion,
     meets,
     out_of_time,
-    starts_there,
 )
+from hovi.planning.solver.requirements.ends import starts_there
 from hovi.planning.solver.status import Status, unfinished
 from hovi.planning.solver.warm_start import follow
 from hovi.scene.lagrangian import PointTerms

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from hovi.discrete.output.caution import caution_lines
 from hovi.discrete.trajectory import Trajectory
 from hovi.planning.problem.limit_violation import closeness
-from hovi.planning.solver.outcome.margins import all_distances, least_distance
+from hovi.planning.solver.requirements.distances import all_distances, least_distance
 from hovi.planning.solver.solver import Solution
 from hovi.planning.solver.status import Status
 from hovi.study.storage.rows import PlanRow
