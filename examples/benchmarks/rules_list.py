@@ -1,0 +1,1508 @@
+"""The rules of the stack that solves, each with the switch that turns it off: see rules.py.
+
+A rule is a piece of logic that is not needed for a result to be right, but is there so that one is
+found, or found in fewer steps. Checks against false successes, time limits and Ctrl-C are no rules.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from switches import Edit
+
+
+@dataclass(frozen=True)
+class Rule:
+    """A rule.
+
+    name: in tables. mechanism: rules of one are turned off in pairs, too. meaning: a sentence that
+    says what it does. edits: what turns it off.
+    """
+
+    name: str
+    mechanism: str
+    meaning: str
+    edits: tuple[Edit, ...]
+
+    @property
+    def where(self) -> str:
+        """File and function."""
+        module, _, function = self.edits[0].where.partition(":")
+        return f"{module.removeprefix('hovi.').replace('.', '/')}: {function}"
+
+
+RULES: list[Rule] = []
+_HERE = ["", ""]
+"""Mechanism and module of the rules that follow."""
+
+
+def _at(mechanism: str, module: str) -> None:
+    _HERE[:] = mechanism, f"hovi.{module}"
+
+
+def _rule(
+    name: str, meaning: str, function: str, on: str, off: str, probed: bool = True, times: int = 1
+) -> None:
+    """A rule whose switch replaces one expression of a function."""
+    edit = Edit(f"{_HERE[1]}:{function}", on, off, probed, times)
+    RULES.append(Rule(name, _HERE[0], meaning, (edit,)))
+
+
+def _and(function: str, on: str, off: str) -> None:
+    """One more expression of the last rule, in the same module."""
+    last = RULES.pop()
+    edit = Edit(f"{_HERE[1]}:{function}", on, off)
+    RULES.append(Rule(last.name, last.mechanism, last.meaning, (*last.edits, edit)))
+
+
+_at("trust region", "optimize.trust_region")
+_rule(
+    "exact before the last step",
+    "Models are exact once a Newton step predicts a relative decrease of 1e-5.",
+    "_iterate",
+    "settled or before <= EXACT_MODEL_DECREASE * abs(value)",
+    "settled",
+)
+_rule(
+    "chord steps",
+    "The last digits come by gradients with the last factorisation.",
+    "_iterate",
+    "settled and accepted and exact and not last and trial.factor is not None",
+    "False",
+)
+_rule(
+    "settle slowly",
+    "Newton steps that shrink by less than 0.7 are the last, by rounding.",
+    "_is_last",
+    "SLOWEST * before",
+    "math.inf",
+)
+_rule(
+    "stationary by size",
+    "A step that is small relative to the data ends a solve whose decrease is not small.",
+    "_is_stationary",
+    "short and objective.relative_size(outcome.x, trial.step, model) <= criteria.step",
+    "False",
+)
+_rule(
+    "last step within rounding",
+    "A last Newton step is accepted although the value rises within rounding.",
+    "_iterate",
+    "settled and value <= outcome.value + 100 * noise",
+    "False",
+)
+_rule(
+    "shift carries over",
+    "The shift of the last subproblem is the first guess of the next.",
+    "_iterate",
+    "next_shift(trial.shift, trial.norm, radius)",
+    "0.0",
+)
+_rule(
+    "small shift at first",
+    "A search that began with a shift goes on from a smaller one after a failed factorisation.",
+    "_ShiftSearch.after_failure",
+    "1e-5 if self.reached else 0.03",
+    "0.03",
+)
+_rule(
+    "hard case",
+    "A step that no shift makes long enough is extended along the lowest eigenvector.",
+    "solve_subproblem",
+    "trial.norm < radius and search.is_hard_case(shift)",
+    "False",
+)
+_and(
+    "solve_subproblem",
+    "last is not None and last[1].norm < radius and search.is_hard_case(last[1].shift)",
+    "False",
+)
+_rule(
+    "end where stalled",
+    "A search for least violation ends where five steps decrease it by less than a tenth.",
+    "_iterate",
+    "len(values) > STALLED_STEPS and gained < enough and enough > 0.0",
+    "False",
+)
+_at("trust region", "optimize.quadratic_model")
+_rule(
+    "parabola after a failure",
+    "After a refused step the radius is that of the least value of a parabola along it.",
+    "next_radius",
+    "max(0.25, share)",
+    "0.25",
+)
+_rule(
+    "two ways to grow",
+    "The radius grows by 1.4 instead of 2 where the model was only fairly good.",
+    "next_radius",
+    "2.0 if ratio > 0.9 else 1.4",
+    "2.0",
+)
+_rule(
+    "rounding counts as agreement",
+    "Decreases that are rounding, actual and predicted, count as a good step.",
+    "decrease_ratio",
+    "abs(actual) <= noise and abs(predicted) <= 10 * noise",
+    "False",
+)
+_at("trust region", "planning.solver.action_objective")
+_rule(
+    "predicted curvature",
+    "The curvature of torques is weighted by the torques that the last step predicted.",
+    "ActionObjective.model",
+    "previous is not None and step is not None and self._expansion is not None",
+    "False",
+)
+_rule(
+    "merge tree on many intervals",
+    "Beyond 1,000 intervals steps are solved by merging intervals instead of a band.",
+    "ActionObjective.__init__",
+    "mergeable and problem.ld.chart is None and not small",
+    "False",
+)
+_at("interior steps", "planning.solver.bounded_action")
+_rule(
+    "predicted curvature within limits",
+    "The same within limits.",
+    "BoundedAction._slope",
+    "self._predicted is not None",
+    "False",
+)
+_at("interior steps", "optimize.bounded_steps")
+_rule(
+    "corrected steps",
+    "Where the model is convex, a step aims at a smaller mu (Mehrotra).",
+    "BoundedSteps.step",
+    "trial.newton and not self.cautious and ahead",
+    "False",
+)
+_rule(
+    "second-order correction",
+    "Its second-order terms are corrected.",
+    "BoundedSteps._corrected",
+    "barrier.corrected_targets(y, affine, mu)",
+    "barrier.with_mu(mu).central_targets()",
+)
+_rule(
+    "Gondzio corrections",
+    "Outliers among the products are corrected, up to three times.",
+    "BoundedSteps._corrected",
+    "min(along.primal, along.dual) > LONG_STEP",
+    "True",
+)
+_rule(
+    "corrected steps within the radius",
+    "A corrected step beyond 1.5 radii is replaced by a plain one.",
+    "BoundedSteps.step",
+    "step.share * step.trial.norm <= MAX_STRETCH * self.radius",
+    "True",
+)
+_rule(
+    "shorter shares",
+    "A shorter part of a step is taken where that predicts more.",
+    "BoundedSteps._shortened",
+    "abs(predicted) <= 10 * self.noise or (pulled is not None and predicted > 0)",
+    "True",
+)
+_rule(
+    "multipliers follow cut steps in part",
+    "A step cut to less than a tenth takes a part of the change of the equations' multipliers.",
+    "_reaction_share",
+    "min(1.0, share / FULL_REACTION_SHARE)",
+    "1.0",
+)
+_rule(
+    "radius grows fourfold",
+    "Among obstacles the radius grows by four where the model predicted the decrease to 5 %.",
+    "BoundedSteps.radius_after",
+    "reopens and abs(ratio - 1.0) <= ALIKE and length > 0.7 * last",
+    "False",
+)
+_rule(
+    "radius follows cut steps",
+    "A step at the radius that bounds cut to less than a tenth shortens the radius.",
+    "BoundedSteps.radius_after",
+    "min(radius, max(CUT_RADIUS * length, LEAST_CUT_RADIUS))",
+    "radius",
+)
+_rule(
+    "radius shortened while unmatched",
+    "The same by 0.3, or 0.09, while outputs differ from their slacks among obstacles.",
+    "BoundedSteps.radius_after",
+    "not reopens",
+    "True",
+)
+_rule(
+    "last mu by the present cost",
+    "The last barrier parameter falls with the cost where the guess cost far more.",
+    "BoundedSteps.final_mu",
+    "min(max(share, LEAST_DENSITY), 1.0)",
+    "1.0",
+)
+_rule(
+    "leave out concavity",
+    "A model that is not convex is replaced by one without the rows' negative curvature.",
+    "BoundedSteps.model",
+    "self.exact_from_now_on or not self.objective.may_be_concave",
+    "True",
+)
+_at("interior steps", "optimize.interior_point")
+_rule(
+    "same radius for the plain step",
+    "After a refused corrected step the plain one has the same radius.",
+    "_Iteration._try",
+    "not self.cautious",
+    "False",
+)
+_rule(
+    "wide radius of warm starts",
+    "A warm start within limits has a first radius of 1000 instead of 50.",
+    "minimize_bounded",
+    "cold if start is None else warm",
+    "cold",
+)
+_rule(
+    "unit of a cost near zero",
+    "Where the guess costs next to nothing, 1 is the unit of the barrier.",
+    "minimize_bounded",
+    "density < DENSITY_FLOOR",
+    "False",
+)
+_rule(
+    "end after a short step",
+    "A cut step ends a solve if it predicts 1e-4 of what is enough for a whole one.",
+    "_Iteration._finished",
+    "step.remaining <= SHORT_STEP_SHARE * enough",
+    "False",
+)
+_rule(
+    "end without equations",
+    "Four steps that predict nothing end a solve although equations do not hold.",
+    "_Iteration._finished",
+    "self.unmet % MAX_UNMET == 0",
+    "self.unmet == 0",
+)
+_at("interior barrier", "optimize.interior_point")
+_rule(
+    "raise mu when bounds cut",
+    "After four steps in a row that bounds cut, mu is raised tenfold.",
+    "_Iteration._raise_mu",
+    "self.cut < MOST_CUT or mu <= outcome.barrier.mu",
+    "True",
+)
+_rule(
+    "reopen slacks",
+    "Among obstacles a stalled solve moves its slacks inside and goes on.",
+    "_Iteration._reopened",
+    "not objective.reopens or self.reopenings >= MAX_REOPENINGS or outside > LARGEST_REOPENED",
+    "True",
+)
+_rule(
+    "leave saddles within limits",
+    "A saddle at the end is left along negative curvature, up to five times.",
+    "_Iteration.run",
+    "exact and (definite or not self._leave_saddle())",
+    "exact",
+)
+_rule(
+    "room at a saddle",
+    "From a saddle of an inexact model a solve goes on with slacks inside and a larger mu.",
+    "_Iteration.run",
+    "not (exact or definite)",
+    "False",
+)
+_rule(
+    "end at a saddle that is not left",
+    "A solve that stalls at a saddle ends there as stationary.",
+    "_Iteration.run",
+    "self.outcome.x is self.saddle",
+    "False",
+    times=2,
+)
+_rule(
+    "end where stalled within limits",
+    "Twelve steps without progress end a solve as diverged.",
+    "_Iteration._is_hopeless",
+    "self.stalled >= MAX_STALLED_STEPS",
+    "False",
+)
+_rule(
+    "short steps are no progress",
+    "Steps far shorter than the radius count as stalled while bounds are not met.",
+    "_Iteration._try",
+    "short and not (outcome.feasible and length > NO_LENGTH)",
+    "False",
+)
+_rule(
+    "end where violation is slow",
+    "Forty steps in which |y - s| hardly falls end a solve as diverged.",
+    "_Iteration._is_hopeless",
+    "len(self.violations) > MAX_SLOW_STEPS",
+    "False",
+)
+_rule(
+    "end at huge multipliers",
+    "Multipliers above 1e12 densities end a solve as diverged.",
+    "_Iteration._is_hopeless",
+    "self.penalty > MAX_FORCE * self.density",
+    "False",
+)
+_rule(
+    "forget the penalty",
+    "The penalty of |y - s| is set to zero where mu or the outputs change.",
+    "_Iteration._reduce_mu",
+    "0.0",
+    "self.penalty",
+)
+_rule(
+    "mark again",
+    "A later point takes the place of a marked one up to 1.5 times its product.",
+    "_Iteration._mark",
+    "product <= MARKED_AGAIN * self.marked",
+    "False",
+)
+_rule(
+    "drop marks",
+    "Marked points with a smaller mu are dropped where mu is raised.",
+    "_Iteration._drop_marks",
+    "mark[0] > mu",
+    "True",
+)
+_rule(
+    "refine while mu falls",
+    "Control points are halved and rows added at every tenth of mu, not at the end alone.",
+    "_Iteration._refined",
+    "early and not at_end",
+    "not at_end",
+)
+_rule(
+    "rows at once",
+    "Rows of distances are added after any step that brings a pair near.",
+    "_Iteration._refined",
+    "self.objective.refine_at_once(outcome.x)",
+    "None",
+    False,
+)
+_rule(
+    "radius cut where outputs are added outside",
+    "Outputs that are added outside their bounds cut the radius to 3.",
+    "_Iteration._replaced",
+    "beyond[len(found.kept) :].any()",
+    "False",
+)
+_rule(
+    "radius restored once matched",
+    "The radius before such a cut is restored once outputs equal their slacks.",
+    "_Iteration._try",
+    "violation <= MATCHED",
+    "False",
+)
+_rule(
+    "hand over multipliers",
+    "New rows outside their bounds take over the forces of rows beside them.",
+    "_Iteration._replaced",
+    "found.handed is not None",
+    "False",
+)
+_rule(
+    "room for new outputs",
+    "Outputs that are added outside their bounds raise mu and move other slacks inside.",
+    "_Iteration._replaced",
+    "mu > barrier.mu",
+    "False",
+)
+_rule(
+    "mu not below the mean product",
+    "After new outputs mu is at least the mean product.",
+    "_Iteration._replaced",
+    "max(barrier.mu, self.product)",
+    "barrier.mu",
+)
+_at("interior barrier", "optimize.barrier")
+_rule(
+    "slacks move with their outputs",
+    "Slacks of outputs that refined rows move away from a single bound move along.",
+    "Barrier.refined",
+    "self._moved_inside(y[:old] - before, kept)",
+    "0.0",
+)
+_rule(
+    "multipliers of former rows",
+    "New rows begin with the multiplier of the row that was at their place.",
+    "Barrier.refined",
+    "origin >= 0",
+    "origin < -1",
+)
+_rule(
+    "fraction to the boundary grows",
+    "The largest share of a gap in one step grows as mu falls.",
+    "Barrier.boundary_fraction",
+    "min(max(FRACTION_TO_BOUNDARY, 1.0 - self.mu / self.scale), LARGEST_FRACTION)",
+    "FRACTION_TO_BOUNDARY",
+)
+_at("equations", "optimize.bordered_model")
+_rule(
+    "stiff combinations alone",
+    "Combinations of equations that bounds hold back are left to the penalty.",
+    "EquationModel.factor",
+    "values * self.penalty > LEAST_STIFFNESS",
+    "values > 0.0",
+)
+_at("equations", "optimize.lagrange_newton")
+_rule(
+    "second-order corrections",
+    "A whole step that does not halve the residual is corrected by it.",
+    "_Search._search_along",
+    "share == 1.0 and size >= 0.5 * self.size and math.isfinite(size)",
+    "False",
+)
+_rule(
+    "restoration",
+    "Where no share of a step is accepted, the residual alone is made smaller.",
+    "_Search._restore",
+    "self.restorations > MAX_RESTORATIONS",
+    "True",
+)
+_rule(
+    "no curvature of charts far away",
+    "Far from a minimum models leave out the multipliers' curvature of charts.",
+    "_Search.run",
+    "self.decrease <= EXACT_DECREASE",
+    "True",
+)
+_rule(
+    "larger penalties",
+    "The penalty grows where a larger one makes the Hessian definite without a shift.",
+    "_Search._factor",
+    "factor is None and model.factor(self.max_penalty, 0.0) is not None",
+    "False",
+)
+_rule(
+    "loose equations far away",
+    "Far from a minimum linearised equations are solved to 1e-2.",
+    "_Search._step",
+    "min(max(min(self.before, 1.0) ** 2, LEAST_ACCURACY), FIRST_ACCURACY)",
+    "LEAST_ACCURACY",
+)
+_rule(
+    "decrease decides where equations hold",
+    "Where the residual is small, a step has to decrease the cost by Armijo's rule.",
+    "_Search._accepted",
+    "share * min(-slope, LARGE_SLOPE) ** 2.3 > before**1.1",
+    "False",
+)
+_rule(
+    "leave saddles under equations",
+    "A saddle is left along the lowest tangent direction.",
+    "_Search._at_saddle",
+    "curvature >= 0.0",
+    "True",
+)
+_at("equations", "planning.solver.augmented_lagrangian_rounds")
+_rule(
+    "large penalty for a warm guess",
+    "A guess that nearly has no passive torque begins with a thousandfold penalty.",
+    "first_multipliers",
+    "share <= WARM_TORQUE_SHARE",
+    "False",
+)
+_rule(
+    "first rounds stop early",
+    "Rounds stop by their residual, not at full accuracy.",
+    "minimize_constrained",
+    "float(np.clip(max(sizes) ** 2, 1e-12, FIRST_DECREASE))",
+    "1e-12",
+)
+_rule(
+    "end where penalties have no effect",
+    "Two larger penalties without effect end the rounds.",
+    "minimize_constrained",
+    "max(stuck) >= MAX_STUCK or _at_maximum_penalty(multipliers, first, slow)",
+    "_at_maximum_penalty(multipliers, first, slow)",
+)
+_at("equations", "planning.solver.methods.augmented_lagrangian")
+_rule(
+    "polish after rounds",
+    "Eight Newton steps with updated multipliers after the last round.",
+    "AugmentedLagrangian.minimize",
+    "POLISHING_STEPS if status is Status.MINIMUM else 0",
+    "0",
+)
+_rule(
+    "smallest penalty for the polish",
+    "These steps use the smallest penalty with a definite Hessian.",
+    "_polished",
+    "_smallest_penalty(problem, path, known) if steps > 0 else known",
+    "known",
+)
+_at("equations", "planning.solver.methods.lagrange_newton")
+_rule(
+    "Lagrange-Newton",
+    "Equations without limits by Newton's method on the KKT equations, not by rounds.",
+    "LagrangeNewton.supports",
+    "problem.constrained and not problem.limited",
+    "False",
+)
+_rule(
+    "one round before Lagrange-Newton",
+    "With equations at nodes alone a rough augmented Lagrangian comes first.",
+    "_Search.run",
+    "multipliers is None and len(problem.passive) == 0",
+    "False",
+)
+_rule(
+    "least-squares multipliers of a near guess",
+    "A guess near a minimum begins with least-squares multipliers.",
+    "_Search.run",
+    "len(problem.passive) > 0",
+    "False",
+)
+_rule(
+    "rounds where Lagrange-Newton fails",
+    "Rounds of an augmented Lagrangian follow where it diverges.",
+    "_Search.run",
+    "not found.stuck",
+    "False",
+)
+_at("equations", "planning.solver.methods.bounded_search")
+_rule(
+    "equations in the steps",
+    "Within limits steps meet conditions at nodes, instead of rounds.",
+    "BoundedSearch.solve",
+    "self._solved_under_conditions(path, start)",
+    "None",
+    False,
+)
+_rule(
+    "rounds begin where the last ended",
+    "Each round within limits begins with the slacks and multipliers of the last.",
+    "BoundedSearch.solve",
+    "len(y) == len(barrier.s) == len(objective.bounds.lower)",
+    "False",
+)
+_rule(
+    "larger last mu in rounds",
+    "Rounds have a last barrier parameter of at least 3e-7.",
+    "BoundedSearch.solve",
+    "max(ROUND_BARRIER, criteria.barrier)",
+    "criteria.barrier",
+)
+_at("warm starts", "planning.solver.methods.bounded_search")
+_rule(
+    "points of earlier solves",
+    "A central path keeps the points of earlier solves with a larger barrier.",
+    "BoundedSearch._add_points",
+    "self.points or ([] if self.along is None else self.along.points)",
+    "[]",
+)
+_rule(
+    "look around",
+    "Pairs within 2 cm of a known motion get rows at once.",
+    "BoundedSearch.look_around",
+    "self.near is not None",
+    "False",
+)
+_rule(
+    "exact models for other ends",
+    "Among obstacles a solve that follows another motion keeps all curvature.",
+    "BoundedSearch._objective",
+    "self.along is not None and self.level is None",
+    "False",
+)
+_rule(
+    "wide radius at a level",
+    "A solve that begins on a central path has a wide first radius among obstacles.",
+    "BoundedSearch._objective",
+    "(BoundedAction if self.at_level else ClearedAction).radii",
+    "ClearedAction.radii",
+)
+_at("warm starts", "planning.solver.central_path")
+_rule(
+    "marked points",
+    "A solve for other ends begins at a point where the barrier was larger.",
+    "CentralPath.at",
+    "large[-1] if large else self.points[0]",
+    "self.points[-1]",
+)
+_at("warm starts", "planning.solver.methods.feasibility")
+_rule(
+    "solve nearby",
+    "A guess that is the motion of a similar problem begins with a small barrier.",
+    "feasible_motion",
+    "_solved_nearby(search, path)",
+    "None",
+    False,
+)
+_rule(
+    "go on where closer",
+    "A warm solve at its iteration limit within bounds is continued.",
+    "_solved_nearby",
+    "not closer or left <= 0",
+    "True",
+)
+_rule(
+    "anew where a central path fails",
+    "Without known rows a solve from the guess follows one along the central path.",
+    "_solved_nearby",
+    "along is not None and along.rows is None and not outcome.settled",
+    "False",
+)
+_rule(
+    "follow the solution",
+    "Whole Newton steps from the last solution within limits.",
+    "_followed",
+    "known is None or search.near is not None or search.problem.constrained",
+    "True",
+)
+_rule(
+    "warm at the solution",
+    "Ends that moved little begin at the solution with its multipliers.",
+    "_solved_along",
+    "along.barrier is not None and shift <= WARM_SHIFT",
+    "False",
+)
+_rule(
+    "barrier by the move",
+    "The first barrier parameter is proportional to the move of the ends.",
+    "_solved_along",
+    "float(np.clip(SHIFT_LEVEL * shift, *SHIFT_LEVELS))",
+    "SHIFT_LEVELS[1]",
+)
+_rule(
+    "adopt multipliers of conditions",
+    "Multipliers of conditions at nodes are those of the similar problem.",
+    "_adopt",
+    "along.conditions is not None",
+    "False",
+)
+_rule(
+    "adopt margins",
+    "So are the margins by which bounds are tightened.",
+    "_adopt",
+    "along.margins is not None and along.margins.shape == search.margins.shape",
+    "False",
+)
+_rule(
+    "adopt rows of distances",
+    "So are rows of distances.",
+    "_adopt",
+    "along.near is not None and search.near is not None",
+    "False",
+)
+_rule(
+    "close points among obstacles",
+    "Among obstacles a solve for other ends begins within 0.1 rad of the solution.",
+    "_solved_from_level",
+    "along.close(level, problem.coordinates) if other_ends else along.at(level)",
+    "along.at(level)",
+)
+_rule(
+    "refine rows at a level",
+    "On another grid control points are halved before the first step.",
+    "_solved_from_level",
+    "along.rows is None",
+    "False",
+)
+_at("warm starts", "optimize.nearby_bounded")
+_rule(
+    "refine a followed solution",
+    "Control points of a followed solution are halved.",
+    "_Newton.run",
+    "self.most_outside <= ROOM and self._refined()",
+    "False",
+    False,
+)
+_at("warm starts", "planning.solver.warm_start")
+_rule(
+    "predict the replanned motion",
+    "A motion without limits is replanned from its first-order prediction.",
+    "follow",
+    "not problem.plain",
+    "True",
+)
+_rule(
+    "predict by the last Hessian",
+    "The prediction uses the last model instead of a new one.",
+    "follow",
+    "not (isinstance(known, BandModel) and known.layout is problem.structure.layout)",
+    "True",
+)
+_at("warm starts", "planning.solver.solver")
+_rule(
+    "replan on the central path",
+    "A motion within limits is replanned from its central path.",
+    "_Again._solved",
+    "problem.limited and self.central is not None",
+    "False",
+)
+_rule(
+    "replan to a far frame goal by guesses",
+    "A frame goal far from the old end begins at a guess of inverse kinematics.",
+    "_Again._solved",
+    "isinstance(goal, FrameGoal) and not is_near(goal, problem, path)",
+    "False",
+)
+_at("warm starts", "planning.solver.receding.shift")
+_rule(
+    "few points of a shifted path",
+    "An advanced motion keeps points whose barriers differ by a factor of 8.",
+    "Shift.central",
+    "not chosen or level * SPACING <= chosen[-1][0]",
+    "True",
+)
+_at("warm starts", "planning.solver.receding.remainder")
+_rule(
+    "short rests are merged",
+    "Less than a twentieth of an interval becomes one with the next.",
+    "Remainder.after",
+    "int(short)",
+    "0",
+)
+_at("distances", "planning.solver.methods.interior_point")
+_rule(
+    "rows of distances",
+    "Distances are rows where pairs come near, not outputs at all points.",
+    "takes_rows",
+    "problem.has_limits or problem.clearance.self_collision",
+    "False",
+)
+_rule(
+    "try rows then points",
+    "Where a solve with rows finds no motion, one at the points is tried.",
+    "InteriorPoint._solved",
+    'self.distances == "rows" or found.status not in WITHOUT_MOTION',
+    "True",
+)
+_rule(
+    "without pairs first",
+    "Without limits a solve without any pair comes first.",
+    "InteriorPoint._solved",
+    "not problem.has_limits",
+    "False",
+)
+_at("distances", "planning.solver.methods.active_pairs")
+_rule(
+    "pairs that touch at first",
+    "At the points, pairs within 2 mm along the guess are bounded from the beginning.",
+    "_Rounds.run",
+    "self._too_close(self._problem, path, FIRST_BEYOND)",
+    "np.zeros(0, dtype=np.intp)",
+)
+_rule(
+    "add near pairs, too",
+    "Where pairs are too close, all within 2 cm are added.",
+    "_Rounds._violating",
+    "self._too_close(result.problem, result.path, ADDED_BEYOND)",
+    "self._too_close(result.problem, result.path)",
+)
+_rule(
+    "again from the guess",
+    "After a solve without any pair the next begins at the guess.",
+    "_Rounds.run",
+    "len(chosen) == 0 and result.nit > 0",
+    "False",
+)
+_at("distances", "planning.solver.methods.cleared_motion")
+_rule(
+    "without distances first",
+    "A solve ends at the first motion that does not keep its distances, to be moved out.",
+    "_without_distances",
+    "True",
+    "False",
+)
+_rule(
+    "legs between seams",
+    "A sequence among obstacles is solved leg by leg first.",
+    "_by_legs",
+    "legs_of(search.problem)",
+    "[]",
+)
+_rule(
+    "second level for legs",
+    "Where joining legs fails, it is tried with a larger barrier.",
+    "_by_legs",
+    "LEG_LEVELS if legs else ()",
+    "LEG_LEVELS[:1] if legs else ()",
+)
+_rule(
+    "push out of obstacles",
+    "A rough motion is moved out of obstacles without its dynamics.",
+    "_rough_with_distances",
+    "pushed_out(problem, path, distances, search.near.least)",
+    "path",
+)
+_rule(
+    "detours are compared",
+    "Where the moved motion is a detour or none, the guess is moved out as well.",
+    "cleared_motion",
+    "rough[0] is None or rough[0].rank > (False, DETOUR * abs(free.outputs.value))",
+    "False",
+)
+_rule(
+    "the other rough motion",
+    "Where the better rough motion diverges, the other is solved on.",
+    "cleared_motion",
+    "outcome.why is not Reason.DIVERGED",
+    "True",
+)
+_rule(
+    "rows ahead",
+    "Pairs within 6 cm get rows before a rough motion is solved.",
+    "_rough_with_distances",
+    "search.near.extend(problem, moved, AHEAD)",
+    "search.near.extend(problem, moved, 0.0)",
+    False,
+)
+_rule(
+    "watch from the first",
+    "A rough motion is watched for near pairs before it has any rows.",
+    "_rough_with_distances",
+    "True",
+    "False",
+)
+_rule(
+    "rows of far pairs are dropped",
+    "After a rough motion pairs beyond 3 cm lose their rows.",
+    "_Rough.solved",
+    "self.near.thinned(x, KEPT)",
+    "self.near.thinned(x, 1e9)",
+)
+_at("distances", "planning.solver.methods.feasibility")
+_rule(
+    "beside obstacles",
+    "At the points, a guess free of obstacles is taken as near a solution.",
+    "feasible_motion",
+    "_solved_beside_obstacles(search, path, search.clearance)",
+    "None",
+    False,
+)
+_rule(
+    "stages out of obstacles",
+    "At the points, a motion is moved out of obstacles by 4 cm at a time.",
+    "_moved_out_of_obstacles",
+    "int(np.clip(np.ceil(depth / STAGE_DEPTH), 1, MAX_STAGES))",
+    "1",
+)
+_rule(
+    "without obstacles first",
+    "At the points, the motion without obstacles is where this begins.",
+    "_moved_out_of_obstacles",
+    "_without_obstacles(search, path)",
+    "path",
+    False,
+)
+_at("distances", "planning.solver.near.approaches")
+_rule(
+    "rows around touches",
+    "A least distance that touches its bound gets rows around it.",
+    "approaches_along",
+    "wanted & (lowest[2] < least + TOUCHING)",
+    "wanted & False",
+)
+_rule(
+    "spread rows",
+    "Near pairs get rows at four positions of each interval.",
+    "approaches_along",
+    "chosen[:, None] & (d < least + ahead) & ~_allowed(d, least)",
+    "chosen[:, None] & (d < least + ahead) & False",
+)
+_rule(
+    "rows not where allowed",
+    "No row is added where a distance is below its bound by what is allowed between rows.",
+    "_allowed",
+    "(d < least) & (d >= least - USED)",
+    "(d < least) & False",
+)
+_rule(
+    "closer samples at least distances",
+    "Least distances are found by closer samples, four times.",
+    "_refined",
+    "PASSES if len(at) else 0",
+    "0",
+)
+_at("distances", "planning.solver.near.clearance_rows")
+_rule(
+    "rounded shapes",
+    "Shapes are rounded the more, the farther a pair is from its bound.",
+    "_rounding_of",
+    "np.clip(ROUNDED_SHARE * DISTANCE_SCALE * y, LEAST_ROUNDING, MOST_ROUNDING)",
+    "np.full(np.shape(y), LEAST_ROUNDING)",
+)
+_at("distances", "planning.solver.near.cleared_action")
+_rule(
+    "refuse hidden depth",
+    "A step that brings a pair without a row too deep is refused.",
+    "ClearedAction.outputs",
+    "self.near.hidden_depth(x) > DEEPEST",
+    "False",
+)
+_rule(
+    "sharpen shapes at once",
+    "Shapes are rounded less after any step that brings a row nearer to its bound.",
+    "ClearedAction.refine_at_once",
+    "self.near.sharpen(x)",
+    "False",
+    False,
+)
+_at("limits", "planning.solver.limits.limit_rows")
+_rule(
+    "halve several times",
+    "Parts are halved up to four times at once.",
+    "LimitRows.refine",
+    "range(MAX_HALVINGS)",
+    "range(1)",
+)
+_rule(
+    "no halving below a total",
+    "No part is halved while all control points together cost less than 1e-5.",
+    "LimitRows._coarse",
+    "loss.sum() > self.max_loss",
+    "True",
+)
+_at("limits", "planning.solver.limits.graded_parts")
+_rule(
+    "short parts at ends",
+    "Parts beside a given end near a bound are halved.",
+    "graded",
+    "ends is not None",
+    "False",
+)
+_rule(
+    "short parts where led back",
+    "Parts across the end of a way back are short.",
+    "_short_across",
+    "not long.any()",
+    "True",
+)
+_at("limits", "planning.solver.methods.torque_rates_last")
+_rule(
+    "torque rates last",
+    "Limits on torque rates are imposed after a solve without them.",
+    "with_torque_rates_last",
+    "limits is None or not isinstance(lagrangian, JerkLagrangian) or not lagrangian.torque_rates",
+    "True",
+)
+_rule(
+    "torque rates at once near one",
+    "They are imposed at once on a known motion that is near such a limit.",
+    "with_torque_rates_last",
+    "_margin(problem, limits, path) < NEAR_A_RATE",
+    "False",
+)
+_at("limits", "planning.solver.methods.limits_between_points")
+_rule(
+    "tighten bounds",
+    "Torques beyond a bound between the points get tighter bounds before intervals are halved.",
+    "tightened",
+    "excess > HALVING_EXCESS or (finer and on_grid > MAX_ROUNDS_PER_GRID)",
+    "True",
+)
+_rule(
+    "secant of the tightening",
+    "How much bounds are tightened follows from the last tightening.",
+    "_tightening_factors",
+    "search.tightened is None",
+    "True",
+)
+_rule(
+    "loosen unused bounds",
+    "A tightened bound that is not used is relaxed.",
+    "_solved_tighter",
+    "np.isfinite(sides) & (sides < -UNUSED_MARGIN)",
+    "np.isfinite(sides) & False",
+)
+_rule(
+    "warm where tightened",
+    "A solve with tighter bounds begins with the last slacks and multipliers.",
+    "_solved_tighter",
+    "barrier.warm(objective.bounds, y, mu) if len(y) == len(barrier.s) else None",
+    "None",
+)
+_rule(
+    "few steps where the duration moves",
+    "With a free duration such a solve has at most 25 steps.",
+    "_solved_tighter",
+    "search.timed",
+    "False",
+)
+_rule(
+    "neighbours are halved, too",
+    "Intervals beside one that is halved are halved.",
+    "_solved_on_halves",
+    "worst[:-1]",
+    "worst[:-1] & False",
+)
+_and("_solved_on_halves", "worst[1:]", "worst[1:] & False")
+_rule(
+    "halved intervals from the motion",
+    "A solve on halved intervals begins at the motion.",
+    "_solved_on_halves",
+    "usable(outcome) and by_interval.max() <= WARM_EXCESS",
+    "False",
+)
+_at("attempts", "planning.solver.methods.feasibility")
+_rule(
+    "plain steps and finer parts",
+    "A solve that diverged with corrected steps is repeated with plain ones and finer parts.",
+    "feasible_motion",
+    "outcome.corrected",
+    "False",
+)
+_rule(
+    "end at least violations",
+    "A search ends where three guesses lead to nonzero minima of the violation.",
+    "feasible_motion",
+    "locally_infeasible(search, outcome)",
+    '""',
+    False,
+)
+_at("attempts", "planning.solver.limits.restored_motion")
+_rule(
+    "restored motions",
+    "After a failure motions of small violation are solved from.",
+    "restored_motion",
+    "violation <= SMALL_VIOLATION",
+    "False",
+)
+_rule(
+    "bumped guess for restoring",
+    "Such a motion is looked for from a perturbed guess, too.",
+    "restored_motion",
+    "chain([search.guess], bumped)",
+    "[search.guess]",
+    False,
+)
+_rule(
+    "minimum without limits",
+    "A restored motion that is stationary without violation is a minimum.",
+    "restored_motion",
+    "violation == 0.0",
+    "False",
+)
+_at("attempts", "planning.solver.longer_way_back")
+_rule(
+    "longer way back",
+    "A start outside its limits gets twice the time for its way back, twice.",
+    "minimized",
+    "found.status is not Status.INFEASIBLE or limits is None or not limits.excused",
+    "True",
+)
+_at("durations", "planning.search.joint_duration")
+_rule(
+    "joint solve",
+    "Motion and duration are solved for together where that is supported.",
+    "joint_minimum",
+    "not solves_jointly(problem)",
+    "True",
+)
+_rule(
+    "search again on the new grid",
+    "A search whose duration is not the best on its grid is repeated there.",
+    "best_on_its_grid",
+    "not found.solution.success or is_best(found)",
+    "True",
+)
+_at("durations", "planning.solver.free_duration.timed_search")
+_rule(
+    "first for the given duration",
+    "A distant guess first becomes a motion of its own duration.",
+    "_at_the_points",
+    "not search.criteria.near",
+    "False",
+)
+_rule(
+    "marks of like durations",
+    "Points of a solve that moves the duration are kept within a tenth of the last.",
+    "TimedSearch._at_its_duration",
+    "abs(T / x.duration - 1.0) <= SAME_DURATION",
+    "True",
+)
+_at("durations", "planning.search.free_duration")
+_rule(
+    "failed duration again from near",
+    "A duration that failed from a distant motion is tried from the nearest.",
+    "_Search._next_duration",
+    "beyond.guess_duration == here.duration",
+    "True",
+)
+_rule(
+    "jumps end a bracket",
+    "A jump of the cost within a narrow bracket ends the search for a root.",
+    "_jumps",
+    "a.gap_to(b) <= JUMP_BRACKET and abs(a.total - b.total) > explained",
+    "False",
+)
+_at("durations", "planning.search.search")
+_rule(
+    "other first durations",
+    "Where the first duration has no motion, six others are tried.",
+    "Search._run",
+    "self.free is None or explored.minima[0].success",
+    "True",
+)
+_at("durations", "planning.search.least_duration")
+_rule(
+    "jumps of the weight of time",
+    "For the least time the weight grows by up to 30 while the effort is much of the cost.",
+    "_Search._next",
+    "float(np.clip(wanted, LEAST_JUMP * self.weight, factor * self.weight))",
+    "LEAST_JUMP * self.weight",
+)
+_at("refinement", "planning.refinement.adaptive")
+_rule(
+    "begin again with more points",
+    "A first grid of few points far from a finer motion is replaced by one of more points.",
+    "_Search._refine",
+    "self.restart is not None and _hides(candidate)",
+    "False",
+)
+_rule(
+    "central path on another grid",
+    "Among obstacles a solve on another grid begins on the last central path.",
+    "_along",
+    "central is None or problem.distances is None",
+    "True",
+)
+_rule(
+    "guess first, then near",
+    "Within limits a solve on another grid begins as from a guess, then as near a solution.",
+    "_Search._solved",
+    "(True,) if problem.distances is not None else (None, True)",
+    "(True,)",
+)
+_rule(
+    "continued at its iteration limit",
+    "Within limits a solve at its iteration limit is continued once.",
+    "_Search._solved",
+    "solution.status is Status.ITERATION_LIMIT and problem.limited",
+    "False",
+)
+_rule(
+    "few steps where a joint spins",
+    "A solve that follows a spinning motion has few steps.",
+    "_Search._solved",
+    "last.whirl is not None",
+    "False",
+)
+_rule(
+    "minimum nearby on the next grid",
+    "The next grid is solved by Newton steps from the finer motion.",
+    "_Search._next",
+    "_solved_nearby(finer, fine)",
+    "None",
+    False,
+)
+_rule(
+    "end where grids do not help",
+    "Two grids that do not halve the error end the refinement.",
+    "_Search._stop_reason",
+    "stalled >= MAX_STALLED_ROUNDS",
+    "False",
+)
+_rule(
+    "end where a joint spins",
+    "A refinement ends early where a joint spins too fast.",
+    "_Search._stop_reason",
+    "whirling.is_hopeless(grids=grids, alone=alone, nearly_resolved=nearly)",
+    "False",
+)
+_at("refinement", "planning.refinement.next_grid")
+_rule(
+    "grid of the finer motion",
+    "The grid of the error estimate is the next one if it is nearly fine enough.",
+    "next_grid",
+    "usable and all(demand.remaining(change) <= FINER_GRID_RATIO for demand in demands)",
+    "False",
+)
+_rule(
+    "few points once resolved",
+    "A resolved motion goes on with fewer points per interval.",
+    "next_grid",
+    "error <= (CURVE_TOLERANCE if may_hide else MAX_ERROR_WITH_FEW_POINTS)",
+    "False",
+)
+_at("refinement", "planning.refinement.hp_refinement")
+_rule(
+    "few modes while unresolved",
+    "Intervals have at most six modes while the decay is not known.",
+    "refined",
+    "MODES if decay_known else MODES[MODES <= UNRESOLVED_MODES]",
+    "MODES",
+)
+_rule(
+    "two schemes on a grid",
+    "Intervals of one grid may have two numbers of modes.",
+    "_cheapest",
+    "np.triu_indices(more.shape[1])",
+    "(np.arange(more.shape[1]), np.arange(more.shape[1]))",
+)
+_at("refinement", "planning.refinement.error_estimate")
+_rule(
+    "richer motion within limits",
+    "Within limits the finer motion has two more modes and the same rows.",
+    "finer_than",
+    "problem.limited and solution.central is not None",
+    "False",
+)
+_rule(
+    "finer motion by Newton steps",
+    "Without limits the finer motion comes by Newton steps with reused Hessians.",
+    "finer_solution",
+    "nearby_minimum(objective, start, model, known)",
+    "None",
+    False,
+)
+_rule(
+    "interpolated torques as weights",
+    "Its first Hessian is weighted by interpolated torques.",
+    "finer_solution",
+    "interpolated_slopes(problem.ld, path, fine.ld)",
+    "None",
+    False,
+)
+_rule(
+    "finer motion taken as it is",
+    "A finer motion that was solved to the end is not solved again when it is finished.",
+    "_finished",
+    "known.central.level <= SAME_LEVEL * barrier and meets(known.problem, known.trajectory.path)",
+    "False",
+)
+_rule(
+    "finer start moves along",
+    "A followed finer motion begins as far from the known one as the coarser did.",
+    "followed_within_limits",
+    "problem.coordinates.curved_space is None",
+    "False",
+)
+_at("refinement", "planning.refinement.nearby_minimum")
+_rule(
+    "reused Hessians",
+    "Up to two more steps with one Hessian.",
+    "nearby_minimum",
+    "length > LONG_STEP or correction == MAX_CORRECTIONS",
+    "True",
+)
+_at("refinement", "planning.refinement.resolution")
+_rule(
+    "estimates are kept",
+    "A replanned motion near one that passed keeps its error estimate.",
+    "Resolution.__call__",
+    "self._kept_for(solution) if solution.success else None",
+    "None",
+)
+_rule(
+    "follow the finer motion",
+    "The finer motion of a replanned one follows that of the last.",
+    "Resolution.__call__",
+    "self._followed(solution) or resolved(solution)",
+    "resolved(solution)",
+    False,
+)
+_at("refinement", "planning.search.final_stages")
+_rule(
+    "refine without far limits",
+    "A motion far from its limits is refined without them.",
+    "FinalStages.refined",
+    "far_from_limits(known)",
+    "False",
+)
+_at("search", "planning.search.search")
+_rule(
+    "coarse grid first",
+    "Grids of more than 160 intervals are begun on 80.",
+    "Search._coarse",
+    "grid.intervals <= 2 * COARSE_INTERVALS or continued",
+    "True",
+)
+_rule(
+    "more points where none is found",
+    "Where the first grid has no minimum, one with more points is tried.",
+    "Search._run",
+    "self._needs_more_points(explored)",
+    "False",
+)
+_rule(
+    "nodes where joints speed up",
+    "Where a duration seems too short, nodes are put where joints speed up and slow down.",
+    "Search._run",
+    "self._with_ramps(explored)",
+    "None",
+)
+_rule(
+    "finer tolerances where unresolved",
+    "A motion that its tolerance did not resolve is refined to finer ones.",
+    "Search._at_finer_tolerances",
+    "given is None or self.free is not None or refused.status is not Status.UNRESOLVED",
+    "True",
+)
+_rule(
+    "grids that see narrow features",
+    "Nodes are put where effects have narrow features.",
+    "Search._seeing_features",
+    "tolerance is None or self.free is not None or NARROW not in refused.message",
+    "True",
+)
+_rule(
+    "without self-collision first",
+    "The motion without self-collision is planned first and kept if links stay apart.",
+    "Search.run",
+    "self.without is None",
+    "True",
+)
+_rule(
+    "another branch clear of links",
+    "Where links meet, branches are compared again by motions clear of them.",
+    "Search._over_branches",
+    "self.ends.cheaper_clear(cost, self.deadline)",
+    "None",
+    False,
+)
+_at("search", "planning.search.job")
+_rule(
+    "few points at first",
+    "A single start of a smooth motion begins with few points per interval.",
+    "grid_of",
+    "options.starts == 1 and not free and not isinstance(guess, Trajectory)",
+    "False",
+)
+_rule(
+    "grid of the guess",
+    "A refinement begins on the grid of a given motion if that is finer.",
+    "grid_of",
+    "isinstance(guess, Trajectory) and _is_first_grid(guess.grid, options, scene.order)",
+    "False",
+)
+_at("search", "planning.search.multistart")
+_rule(
+    "held ends",
+    "The end is held where a frame goal is met, if that fails with a free end.",
+    "_attempts",
+    "job.held_at(attempt.guess.q[-1]) if first.isolated or to_branch else None",
+    "None",
+)
+_rule(
+    "guesses to other branches",
+    "Up to three other branches of a frame goal are tried.",
+    "_free_attempts",
+    "first.branches[:FURTHER_BRANCHES]",
+    "()",
+)
+_rule(
+    "further paths",
+    "Further paths of OMPL, and distances at points, where path and direct guess fail.",
+    "_free_attempts",
+    "not rows",
+    "True",
+)
+_rule(
+    "basin hopping",
+    "Later rounds of starts perturb the best minima.",
+    "_round",
+    "done > STARTS_PER_ROUND",
+    "False",
+)
+_rule(
+    "random turns",
+    "Starts of continuous joints are given random full turns.",
+    "_round",
+    "robot.space.angles",
+    "()",
+)
+_at("search", "planning.search.branch_choice")
+_rule(
+    "branches compared by motions",
+    "Branches of a frame goal are compared by motions on four intervals.",
+    "_Choice.ends",
+    "self._solved(pairs) if known and len(pairs) > 1 else ()",
+    "()",
+    False,
+)
+_rule(
+    "rough motions rank branches",
+    "Which branches these are is decided by rough motions.",
+    "_Choice._guesses",
+    "not robot.space.flat or self.scene.terms.timed",
+    "True",
+)
+_rule(
+    "three rough motions",
+    "Rough motions begin from three random bumps instead of one.",
+    "_Choice._guesses",
+    "range(ROUGH)",
+    "range(1)",
+)
+_rule(
+    "solve from rough motions",
+    "Six branches are solved for from their rough motion, too.",
+    "_Choice._guesses",
+    "rank < FROM_ROUGH",
+    "False",
+)
+_at("continuation", "planning.search.search")
+_rule(
+    "continuation",
+    "Easier problems lead to the given one where the direct solve fails.",
+    "Search._continued",
+    "not may_help(found[0])",
+    "True",
+)
+_at("continuation", "planning.search.homotopies")
+_rule(
+    "lighter rotors",
+    "Continuation in rotors that become lighter.",
+    "lighter_rotors",
+    "not job.lagrangian().needs_torques",
+    "True",
+)
+_rule(
+    "rotors without torque limits",
+    "Torque limits hold in the last stage of it alone.",
+    "lighter_rotors",
+    "_without_torque_limits(job)",
+    "job",
+    False,
+)
+_rule(
+    "growing gravity",
+    "Continuation in gravity.",
+    "growing_gravity",
+    "not job.scene.model.gravity.linear.any()",
+    "True",
+)
+_rule(
+    "other durations",
+    "Continuation in the duration.",
+    "other_durations",
+    "LONGER_DURATIONS if limited else SHORTER_DURATIONS",
+    "()",
+)
+_rule(
+    "finer grids",
+    "Continuation from few intervals.",
+    "finer_grids",
+    "N >= 2 * MIN_INTERVALS",
+    "False",
+)
+_rule(
+    "narrowing limits",
+    "Continuation from wider limits.",
+    "narrowing_limits",
+    "not job.limits.bounded.any()",
+    "True",
+)
+_at("continuation", "planning.search.continuation")
+_rule(
+    "more steps",
+    "A motion at its iteration limit gets up to twelve more solves.",
+    "_Continuation.restart",
+    "self.ended is not None or best.status is not Status.ITERATION_LIMIT",
+    "True",
+)
+_rule(
+    "more steps first",
+    "They come before the homotopies where the curvature is positive or among obstacles.",
+    "_order",
+    "[STEPS, *order] if first else [*order, STEPS]",
+    "[*order, STEPS]",
+)
