@@ -1,4 +1,4 @@
-"""Motions that keep a margin: the terms of the interior point, and whole plans."""
+"""Motions that keep a margin to obstacles."""
 
 from __future__ import annotations
 
@@ -18,9 +18,6 @@ from hovi.planning.clearance.obstacles import Box, Obstacle, Sphere
 from hovi.planning.problem.contradictions import contradiction
 from hovi.planning.problem.limits import as_limits
 from hovi.planning.problem.problem import TrajectoryProblem
-from hovi.planning.solver.bounded_action import BoundedAction
-from hovi.planning.solver.clearance_outputs import ClearanceOutputs
-from hovi.planning.solver.solver import guess_path
 from hovi.schemes import galerkin
 from oracles.on_grid import solve_on_grid
 
@@ -42,39 +39,6 @@ def least_distance(
 ) -> float:
     q = trajectory.configurations(np.linspace(0.0, trajectory.duration, samples))
     return float(Distances(robot, clearance).values(q).min())
-
-
-def test_the_model_with_distances_is_that_of_linear_and_square_terms(
-    arm_scene: hovi.Scene,
-) -> None:
-    """phi(x) = action + sum weights (rho y + sigma (y - y0)^2 / 2), with multipliers rho."""
-    given = problem(arm_scene, BALL, intervals=4)
-    assert given.distances is not None
-    limits = as_limits(arm_scene.robot, {"base": "none", "v": 9.0})
-    limited = BoundedAction(given, limits, more=ClearanceOutputs(given.distances, 0.05))
-    random = np.random.default_rng(0)
-    x = guess_path(given, "cubic")
-    y0 = limited.outputs(x).y
-    assert y0.shape == (16 * (2 + 3),)
-    rho, sigma = random.standard_normal(y0.shape), random.uniform(0.0, 9.0, y0.shape)
-    model = limited.model(x, sigma, rho, rho)
-    step = 0.1 * model.random_vector(1)
-
-    def phi(share: float) -> float:
-        outputs = limited.outputs(limited.retract(x, share * step, model))
-        terms = rho * outputs.y + sigma * (outputs.y - y0) ** 2 / 2
-        return outputs.value + float(np.sum(limited.bounds.weights * terms))
-
-    h = 1e-3
-    slope = (8 * (phi(h) - phi(-h)) - (phi(2 * h) - phi(-2 * h))) / (12 * h)
-    assert float(np.vdot(model.gradient, step)) == pytest.approx(slope, rel=1e-6)
-    curve = (16 * (phi(h) + phi(-h)) - (phi(2 * h) + phi(-2 * h)) - 30 * phi(0.0)) / (12 * h * h)
-    local = model.gather(step)
-    square = np.einsum("kia,kijab,kjb->", local, model.intervals.hessian, local)
-    assert float(square) == pytest.approx(curve, rel=1e-3)
-    dy = limited.push(step, model)
-    up, down = (limited.outputs(limited.retract(x, s * h * step, model)).y for s in (1, -1))
-    np.testing.assert_allclose(dy, (up - down) / (2 * h), rtol=1e-4, atol=1e-5)
 
 
 def test_a_ball_on_the_path_is_passed_at_the_margin(arm_scene: hovi.Scene) -> None:

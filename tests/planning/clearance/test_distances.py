@@ -9,12 +9,11 @@ import pinocchio as pin
 import pytest
 
 from hovi.errors import ModelError
-from hovi.planning.clearance.clearance import DISTANCE_SCALE, Clearance
+from hovi.planning.clearance.clearance import Clearance
 from hovi.planning.clearance.convex_shapes import convex_geometry
 from hovi.planning.clearance.distances import Distances
 from hovi.planning.clearance.obstacles import Box, Capsule, Obstacle, Sphere
 from hovi.planning.clearance.pair_distances import PairDistances
-from hovi.planning.solver.clearance_outputs import ClearanceOutputs
 from hovi.robot.loading import load_robot
 from hovi.robot.robot import Robot
 from oracles.finite_differences import derivative_per_point
@@ -107,28 +106,6 @@ def test_curvature_is_the_derivative_of_the_derivative(two_link: Robot) -> None:
     np.testing.assert_array_equal(curvature, curvature.transpose(0, 2, 1))
 
 
-def test_outputs_are_constant_beyond_the_cutoff_with_continuous_derivatives(
-    two_link: Robot,
-) -> None:
-    outputs = ClearanceOutputs(Distances(two_link, Clearance(Sphere([2.85, 0.0, 0.0], 0.2))), 0.1)
-    q = np.linspace([0.0, 0.0], [0.6, 0.6], 400)  # swings away from the ball
-    y = outputs.values(q)[:, 2]
-    d = outputs.distances.values(q)[:, 2]
-    near = d < 0.1 + DISTANCE_SCALE
-    np.testing.assert_allclose(y[near], (d[near] - 0.1) / DISTANCE_SCALE, atol=1e-12)
-    far = d > 0.1 + 3 * DISTANCE_SCALE
-    assert near.any()
-    assert far.any()
-    assert np.ptp(y[far]) == 0.0
-    force = np.ones_like(outputs.values(q))
-    force[:, :2] = 0.0
-    jacobian, curvature = outputs.expand(q, force)
-    numeric = derivative_per_point(outputs.values, q, 1e-5)
-    np.testing.assert_allclose(jacobian[:, 2], numeric[:, 2], atol=1e-6)
-    bend = derivative_per_point(lambda q: outputs.expand(q, 0 * force)[0][:, 2], q, 1e-5)
-    np.testing.assert_allclose(curvature, bend, atol=1e-2 * np.abs(bend).max())
-
-
 def test_results_do_not_depend_on_earlier_queries(panda: Robot) -> None:
     clearance = Clearance(OBSTACLES)
     q = around([0.0, -0.5, 0.0, -2.0, 0.0, 1.6, 0.7], 6)
@@ -167,36 +144,6 @@ def test_a_flat_mesh_is_refused_by_name() -> None:
         convex_geometry(robot)
 
 
-def test_pairs_30_cm_beyond_the_margin_have_no_derivative(two_link: Robot) -> None:
-    margin = 0.1
-    distances = Distances(two_link, Clearance(Sphere([2.85, 0.0, 0.0], 0.2)))
-    q = np.linspace([0.0, 0.0], [0.6, 0.6], 50)
-    d = distances.values(q)
-    far = d > margin + 0.3
-    assert 0 < far.sum() < d.size
-    outputs = ClearanceOutputs(distances, margin)
-    assert outputs.reach == pytest.approx(margin + 0.3)
-    jacobian, curvature = outputs.expand(q, np.where(far, 1.0, 0.0))
-    assert (jacobian[far] == 0.0).all()
-    assert np.mean((jacobian[~far] != 0.0).any(axis=1)) > 0.9  # some are at a symmetric point
-    assert (curvature == 0.0).all()
-
-
-def test_restricted_outputs_are_those_columns(panda: Robot) -> None:
-    outputs = ClearanceOutputs(Distances(panda, Clearance(OBSTACLES)), 0.05)
-    q = around([0.0, -0.5, 0.0, -2.0, 0.0, 1.6, 0.7], 10)
-    some = [7, 30, 12]
-    part = outputs.restricted(some)
-    assert part.size == len(some)
-    assert part.distances.pairs == tuple(outputs.distances.pairs[k] for k in some)
-    np.testing.assert_allclose(part.values(q), outputs.values(q)[:, some], atol=1e-12)
-    force = np.zeros((len(q), outputs.size))
-    force[:, some] = 1.0
-    whole, alone = outputs.expand(q, force), part.expand(q, force[:, some])
-    np.testing.assert_allclose(alone[0], whole[0][:, some], atol=1e-12)
-    np.testing.assert_allclose(alone[1], whole[1], atol=1e-12)
-
-
 def test_second_derivatives_include_those_by_coal(two_link: Robot) -> None:
     """Of a cone, of which the compiled part knows no distances, beside a sphere."""
     distances = Distances(two_link, Clearance(Sphere([1.9, 0.0, 0.6], 0.1)))
@@ -215,18 +162,3 @@ def test_second_derivatives_include_those_by_coal(two_link: Robot) -> None:
         lambda q: measured.expand(q, pairs, np.inf, None)[1].sum(axis=1), q, 1e-4
     )
     np.testing.assert_allclose(curvature, bend, atol=2e-3 * np.abs(bend).max())
-
-
-def test_only_pairs_with_a_force_bend_the_motion(two_link: Robot) -> None:
-    outputs = ClearanceOutputs(Distances(two_link, Clearance(Sphere([1.9, 0.0, 0.4], 0.2))), 0.3)
-    q = around([0.1, 0.3], width=0.05)
-    y = outputs.values(q)
-    assert (y < 1.0).all()  # in reach, and not levelling off
-    force = np.zeros(y.shape)
-    assert (outputs.expand(q, force)[1] == 0.0).all()
-    force[:, tip_column(outputs.distances)] = 1.0
-    alone = outputs.expand(q, force)[1]
-    small = 1e-6 * np.where(force > 0, 0.0, 1.0)  # no threshold: each counts by its force
-    more = outputs.expand(q, small)[1]
-    assert (more != 0.0).any()
-    np.testing.assert_allclose(outputs.expand(q, force + small)[1], alone + more, atol=1e-15)

@@ -8,11 +8,9 @@ import pinocchio as pin
 import pytest
 
 import hovi
-from hovi.planning.clearance.clearance import DISTANCE_SCALE, Clearance
+from hovi.planning.clearance.clearance import Clearance
 from hovi.planning.clearance.convex_shapes import convex_geometry
-from hovi.planning.clearance.within_reach import NEVER_NEAR, distances_within_reach, reach_of
-from hovi.planning.solver.clearance_outputs import CUTOFF
-from hovi.planning.solver.near.clearance_rows import MOST_INFLATION, MOST_ROUNDING
+from hovi.planning.clearance.within_reach import distances_within_reach, reach_of
 
 NEAR = hovi.Sphere([0.8, 0.0, 0.4], 0.1, name="near")
 FAR = hovi.Sphere([9.0, 0.0, 0.0], 0.1, name="far")
@@ -71,10 +69,6 @@ def test_a_robot_with_joints_that_slide_has_no_reach(name: str) -> None:
     robot = hovi.load_robot(name)
     assert reach_of(robot) == np.inf
     assert others(robot, [FAR]) == {"far"}
-
-
-def test_where_an_obstacle_is_left_out_rows_are_constant() -> None:
-    assert CUTOFF[1] * DISTANCE_SCALE + MOST_INFLATION * MOST_ROUNDING + 1e-3 < NEVER_NEAR
 
 
 def test_pairs_that_may_touch_are_those_of_obstacles_that_are_left(panda: hovi.Robot) -> None:

@@ -10,9 +10,6 @@ from numpy.polynomial import Legendre
 import hovi
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.problem.torque_moments import TorqueMoments
-from hovi.planning.solver.action_objective import ActionObjective
-from hovi.planning.solver.multipliers import Multipliers
-from hovi.planning.solver.solver import guess_path
 from hovi.schemes import by_name
 
 Array = npt.NDArray[np.float64]
@@ -75,26 +72,6 @@ def test_moments_of_another_grid_are_its_own() -> None:
     problem = problem_with("galerkin-2x8")
     assert problem.torque_moments is not None
     assert problem.on(problem_with("galerkin-2").grid).torque_moments is None
-
-
-def test_an_interval_has_the_same_terms_beside_intervals_of_other_schemes() -> None:
-    """Where torques vanish at points the penalty is that at points, whatever the neighbours."""
-    alike, mixed = (
-        problem_with("galerkin-2"),
-        problem_with("galerkin-2", "galerkin-2x8", "galerkin-2"),
-    )
-    assert alike.torque_moments is None
-    assert mixed.torque_moments is not None
-    models = []
-    for problem in (alike, mixed):
-        path = guess_path(problem, "cubic")
-        known = Multipliers.zero(problem, 3.0, 1.0)
-        known = known.updated(ActionObjective(problem).residuals(path), problem.passive)
-        objective = ActionObjective(problem, multipliers=known)
-        models.append(objective.model(path, None, None).intervals)
-    for part in ("gradient", "hessian"):
-        one, other = (getattr(model, part)[[0, 2]] for model in models)
-        np.testing.assert_allclose(one, other, rtol=0, atol=1e-12 * np.abs(one).max())
 
 
 def test_a_motion_on_several_schemes_is_near_that_on_each() -> None:

@@ -8,11 +8,8 @@ import numpy as np
 import pytest
 
 import hovi
-from hovi import PlanOptions
 from hovi.errors import UnreachableError
-from hovi.planning.search.branch_choice import chosen_ends
 from hovi.robot.robot import Robot
-from hovi.system.deadline import Deadline
 
 FAST = {"intervals": 12, "scheme": "galerkin-2"}
 
@@ -51,28 +48,26 @@ def test_a_motion_begins_and_ends_at_frames(ur5: Robot, scene: hovi.Scene) -> No
     np.testing.assert_allclose(ends.v, 0.0, atol=1e-9)
 
 
-def test_a_start_near_a_given_goal_is_its_own_branch(ur5: Robot, scene: hovi.Scene) -> None:
-    """The motion from another one would be longer."""
+@pytest.mark.parametrize("turn", [0.0, 2 * np.pi])
+def test_a_start_near_a_given_goal_is_its_own_branch(
+    ur5: Robot, scene: hovi.Scene, turn: float
+) -> None:
+    """The motion from another one would be longer. turn: of the last joint, in its guess."""
     q = np.array([0.3, -1.2, 1.3, -0.7, 0.8, 0.0])
-    start = hovi.FrameGoal("tool0", ur5.frame_pose("tool0", q))
-    options = PlanOptions().on(scene)
-    first = chosen_ends(scene, start, hovi.State(q + 0.2), 1.0, options, Deadline()).start
-    np.testing.assert_allclose(first.q, q, atol=1e-8)
-    turn = np.array([0, 0, 0, 0, 0, 2 * np.pi])
-    turned = dataclasses.replace(start, guess=q - turn)
-    first = chosen_ends(scene, turned, hovi.State(q + 0.2), 1.0, options, Deadline()).start
-    np.testing.assert_allclose(first.q, q - turn, atol=1e-8)
+    pose, turned = ur5.frame_pose("tool0", q), q - np.array([0, 0, 0, 0, 0, turn])
+    start = hovi.FrameGoal("tool0", pose, guess=turned if turn else None)
+    motion = hovi.plan(scene, start, hovi.State(q + 0.2), 1.0, max_iterations=1, continuation=False)
+    np.testing.assert_allclose(motion.trajectory.q[0], turned, atol=1e-8)
 
 
 def test_branches_in_an_obstacle_are_not_chosen(ur5: Robot, scene: hovi.Scene) -> None:
-    start, q = np.array([0.3, -1.2, 1.3, -0.7, 0.8, 0]), np.array([0.9, -1.3, 1.4, -0.6, 0.7, 0.1])
+    start, q = np.array([-0.2, -1.2, 1.3, -0.7, 0.8, 0]), np.array([0.9, -1.3, 1.4, -0.6, 0.7, 0.1])
     goal = hovi.FrameGoal("tool0", ur5.frame_pose("tool0", q))
     ball = hovi.Sphere(ur5.frame_position("forearm_link", q[None])[0], 0.02)
     for obstacles, is_taken in (((), True), ((ball,), False)):
-        options = PlanOptions(obstacles=obstacles).on(scene)
-        end = chosen_ends(scene, hovi.State(start), goal, 3.0, options, Deadline()).goal
-        assert isinstance(end, hovi.FrameGoal)
-        assert (np.abs(np.asarray(end.guess) - q).max() < 1e-6) == is_taken
+        motion = hovi.plan(scene, start, goal, 3.0, obstacles=obstacles, self_collision=False)
+        assert motion.success, motion.message
+        assert (np.abs(motion.trajectory.q[-1] - q).max() < 1e-4) == is_taken
 
 
 def test_ends_that_cannot_be_met_are_told(scene: hovi.Scene) -> None:
