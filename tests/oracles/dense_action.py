@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 import hovi
+from oracles.path_steps import moved
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]
@@ -35,17 +36,28 @@ class DenseAction:
         columns = np.concatenate([self.nodes[:-1], self.nodes[1:], modes], axis=1)
         orders = np.concatenate([np.tile(np.arange(k), 2), np.zeros(m - 2 * k)])
         scales = grid.steps[:, None] ** orders
-        self._columns, self._scales = columns, scales
-        size = int(count + inner.sum())
-        self.gradient, self.hessian = np.zeros(size), np.zeros((size, size))
-        for number, scale, g, H in zip(
-            columns, scales, expansion.gradient, expansion.hessian, strict=True
-        ):
+        self._columns, self._scales = columns, scales[:, :, None]
+        self.size = int(count + inner.sum())
+        self.gradient = self.along(expansion.gradient)
+        self.hessian = np.zeros((self.size, self.size))
+        for number, scale, H in zip(columns, scales, expansion.hessian, strict=True):
             own = number >= 0
-            g = g * scale[:, None]
             H = H.transpose(0, 2, 1, 3) * scale[:, None, None, None] * scale[:, None]
-            np.add.at(self.gradient, number[own], g[own])
             self.hessian[np.ix_(number[own], number[own])] += H[own][:, own]
+
+    def along(self, gradients: Array) -> Array:
+        """The gradient of a sum over intervals from those in their columns, (N, m, n)."""
+        total, own = np.zeros(self.size), self._columns >= 0
+        np.add.at(total, self._columns[own], (self._scales * gradients)[own])
+        return total
+
+    def step(self, unknowns: Array) -> Array:
+        """A change of the unknowns in the columns of the intervals: see oracles.path_steps."""
+        return np.asarray(np.append(unknowns, 0.0)[self._columns] * self._scales)
+
+    def moved(self, unknowns: Array) -> hovi.DiscretePath:
+        """The path after a change of the unknowns."""
+        return moved(self._problem, self._path, self.step(unknowns))
 
     def index(self, held: Index | None = None) -> int:
         """The number of negative eigenvalues, none of which is near zero. held: given unknowns."""
@@ -56,10 +68,6 @@ class DenseAction:
         values = np.linalg.eigvalsh(H)
         assert np.abs(values).min() > 1e-9 * np.abs(values).max()
         return int((values < 0).sum())
-
-    def step(self, unknowns: Array) -> Array:
-        """A change of the unknowns in the columns of the intervals: see oracles.path_steps."""
-        return np.asarray(np.append(unknowns, 0.0)[self._columns] * self._scales[:, :, None])
 
     def newton_step(self) -> float:
         """The largest change of q and T v in a step of Newton's method, relative to them."""

@@ -14,14 +14,13 @@ import pytest
 from scipy.integrate import solve_bvp, solve_ivp
 
 import hovi
-from hovi.discrete.grid import DiscretePath
 from hovi.discrete.state import State
 from hovi.errors import InputError, SchemeError
 from hovi.planning.problem.limits import as_limits
-from hovi.planning.solver.action_objective import ActionObjective
 from hovi.scene.casadi_lagrangian import CasadiLagrangian
 from hovi.scene.lagrangian import Lagrangian
 from hovi.schemes import galerkin
+from oracles.dense_action import DenseAction
 
 Array = npt.NDArray[np.float64]
 
@@ -180,23 +179,18 @@ def test_the_gradient_and_hessian_of_the_action_are_its_derivatives(k: int) -> N
     grid = hovi.Grid(np.array([0.5, 0.7, 0.4]), (galerkin(2, k), galerkin(1, k), galerkin(2, k)))
     ld = hovi.DiscreteLagrangian(CasadiLagrangian(q, L), grid)
     problem = hovi.TrajectoryProblem(ld, State([0.1, 0.2]), State([0.6, -0.3]))
-    objective = ActionObjective(problem)
-    x, random = problem.guess("cubic"), np.random.default_rng(k)
-    model = objective.model(x, None, None)
-    step = random.normal(size=len(model.gradient))
+    dense, random = DenseAction(problem, problem.guess("cubic")), np.random.default_rng(k)
+    step = random.normal(size=dense.size)
 
     def action(size: float) -> float:
-        moved: DiscretePath = objective.retract(x, size * step, model)
-        return objective.value(moved)
+        return ld.action(dense.moved(size * step))
 
     small, large = 1e-5, 1e-3
     slope = 8 * (action(small) - action(-small)) - action(2 * small) + action(-2 * small)
     slope /= 12 * small
-    assert slope == pytest.approx(float(model.gradient @ step), rel=1e-6)
+    assert slope == pytest.approx(float(dense.gradient @ step), rel=1e-6)
     bend = (action(large) - 2 * action(0.0) + action(-large)) / large**2
-    columns = model.gather(step)
-    exact = np.einsum("kijab,kia,kjb->", model.intervals.hessian, columns, columns)
-    assert bend == pytest.approx(exact, rel=1e-4)
+    assert bend == pytest.approx(float(step @ dense.hessian @ step), rel=1e-4)
 
 
 @pytest.mark.parametrize(

@@ -11,17 +11,11 @@ import pinocchio as pin
 import pytest
 
 import hovi
-from hovi.discrete.grid import DiscretePath
-from hovi.optimize.criteria import Criteria
+from hovi import solve
 from hovi.planning.clearance.convex_shapes import convex_geometry
 from hovi.planning.clearance.obstacles import Obstacle
 from hovi.planning.problem.limits import as_limits
 from hovi.planning.problem.problem import TrajectoryProblem
-from hovi.planning.solver.methods.active_pairs import with_active_pairs
-from hovi.planning.solver.methods.interior_point import InteriorPoint
-from hovi.planning.solver.methods.method import MethodResult
-from hovi.planning.solver.solver import guess_path
-from hovi.planning.solver.status import Status
 from hovi.robot.robot import Robot
 from hovi.schemes import galerkin
 
@@ -93,24 +87,6 @@ def test_a_pair_that_a_motion_violates_is_added_and_kept_apart(arm_scene: hovi.S
     assert least_distance(arm_scene.robot, [ball], q) >= 0.01 - 1e-7
 
 
-def recorded(problem: TrajectoryProblem) -> tuple[list[set[str]], MethodResult]:
-    """The obstacles of each solve of the interior point, and the result with all their steps."""
-    given, steps = list[set[str]](), 0
-
-    def solve(part: TrajectoryProblem, path: DiscretePath, options: Criteria) -> MethodResult:
-        found = part.distances
-        given.append(set() if found is None else {pair.other for pair in found.pairs})
-        nonlocal steps
-        part_result = InteriorPoint()._minimize(part, path, options, None)
-        steps += part_result.nit
-        assert part_result.problem.finer.clearance is part.clearance
-        return part_result
-
-    result = with_active_pairs(solve, problem, guess_path(problem, "cubic"), Criteria())
-    assert result.nit == steps
-    return given, result
-
-
 def problem_of(scene: hovi.Scene, obstacles: list[Obstacle]) -> TrajectoryProblem:
     grid = hovi.Grid.uniform(T, 12, galerkin(2))
     ld = hovi.DiscreteLagrangian(scene.effort_lagrangian(), grid)
@@ -119,36 +95,31 @@ def problem_of(scene: hovi.Scene, obstacles: list[Obstacle]) -> TrajectoryProble
     return TrajectoryProblem(ld, *ends, limits, clearance=clearance)
 
 
-def test_solves_have_the_pairs_that_the_motion_before_violates(arm_scene: hovi.Scene) -> None:
+def test_several_obstacles_are_kept_at_a_distance(arm_scene: hovi.Scene) -> None:
     """The guess swings by the first ball, the motion without balls hangs down to the second."""
     robot = arm_scene.robot
     path = problem_of(arm_scene, [FAR])
-    straight = path.trajectory(guess_path(path, "cubic"))
-    middle = straight.configurations(np.array([0.5 * T]))
+    middle = path.trajectory(path.guess("cubic")).configurations(np.array([0.5 * T]))
     aside = hovi.Sphere(robot.frame_position("tip", middle)[0], 0.1, name="aside")
-    given, result = recorded(problem_of(arm_scene, [OUT_OF_REACH, FAR, aside]))
-    assert given[0] == {"aside"}
-    assert all("far" not in each for each in given)
-    assert result.status is Status.MINIMUM, result.message
-    free, _ = recorded(problem_of(arm_scene, [FAR]))
-    assert free == [set()]
-    assert result.problem.distances is not None
-    assert {pair.other for pair in result.problem.distances.pairs} == {"far", "aside"}
-    assert result.problem.finer.clearance is result.problem.clearance
+    found = solve(problem_of(arm_scene, [OUT_OF_REACH, FAR, aside]))
+    assert found.success, found.message
+    assert found.problem is not None
+    assert found.problem.distances is not None
+    assert {pair.other for pair in found.problem.distances.pairs} >= {"far", "aside"}
+    assert least_distance(robot, [FAR, aside], sampled(found.trajectory, 2_000)) >= 0.01 - 1e-7
 
 
 def test_a_pair_is_added_where_only_the_motion_violates_it(arm_scene: hovi.Scene) -> None:
     free, problem = reach(arm_scene, []), problem_of(arm_scene, [FAR])
-    guess = sampled(problem.trajectory(guess_path(problem, "cubic")), 200)
+    guess = sampled(problem.trajectory(problem.guess("cubic")), 200)
     tips = arm_scene.robot.frame_position("tip", sampled(free.trajectory, 30))
     balls = [hovi.Sphere(tip, 0.02, name="there") for tip in tips]
     ball = max(balls, key=lambda each: least_distance(arm_scene.robot, [each], guess))
     assert least_distance(arm_scene.robot, [ball], guess) > 0.02
     problem = problem_of(arm_scene, [FAR, ball])
-    given, result = recorded(problem)
-    assert given == [set(), {"there"}]
-    assert result.status is Status.MINIMUM, result.message
-    motion = result.problem.trajectory(result.path)
+    result = solve(problem)
+    assert result.success, result.message
+    motion = result.trajectory
     assert least_distance(arm_scene.robot, [ball], sampled(motion, 2_000)) >= 0.01 - 1e-7
 
 
@@ -156,26 +127,18 @@ def sampled(motion: hovi.Trajectory, count: int) -> Array:
     return motion.configurations(np.linspace(0.0, T, count))
 
 
-def test_the_end_of_the_time_before_the_check_is_reported(arm_scene: hovi.Scene) -> None:
-    """The solve takes all of it."""
+@pytest.mark.parametrize("steps", [0, 1, 5])
+def test_out_of_time_no_motion_among_obstacles_is_a_success(
+    arm_scene: hovi.Scene, steps: int
+) -> None:
+    """However many steps fit in the time: every one after them takes all of it."""
 
-    def solve(part: TrajectoryProblem, path: DiscretePath, options: Criteria) -> MethodResult:
-        result = InteriorPoint()._minimize(part, path, Criteria(), None)
-        time.sleep(options.time_limit or 0.0)
-        return result
+    def slow(number: int, cost: float) -> None:
+        time.sleep(0.3 if number > steps else 0.0)
 
     problem = problem_of(arm_scene, [FAR])
-    options = Criteria(time_limit=0.3)
-    result = with_active_pairs(solve, problem, guess_path(problem, "cubic"), options)
-    assert result.status is Status.TIME_LIMIT
-    assert "before the distances along the motion were checked" in result.message
-    assert result.problem.clearance is problem.clearance
-
-
-def test_without_time_for_the_first_check_the_solve_reports_it(arm_scene: hovi.Scene) -> None:
-    problem = problem_of(arm_scene, [FAR])
-    result = InteriorPoint().minimize(
-        problem, guess_path(problem, "cubic"), Criteria(time_limit=0.0)
-    )
-    assert result.status is Status.TIME_LIMIT
-    assert result.problem.clearance is problem.clearance
+    found = solve(problem, time_limit=0.3 if steps else 0.0, report=slow)
+    assert found.status == "time_limit"
+    assert not found.success
+    assert found.problem is not None
+    assert found.problem.clearance is problem.clearance

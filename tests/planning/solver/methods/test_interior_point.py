@@ -8,19 +8,13 @@ import numpy as np
 import pytest
 
 import hovi
+from hovi import Solution, Status, plan, solve
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import Grid
 from hovi.discrete.state import State
 from hovi.discrete.trajectory import Trajectory
-from hovi.optimize.criteria import Criteria
-from hovi.optimize.ended import Reason
-from hovi.optimize.interior_point import minimize_bounded
 from hovi.planning.problem.limits import Limits, as_limits
 from hovi.planning.problem.problem import TrajectoryProblem
-from hovi.planning.search.planner import plan
-from hovi.planning.solver.bounded_action import BoundedAction
-from hovi.planning.solver.solver import Solution, guess_path, solve_on_grid
-from hovi.planning.solver.status import Status
 from hovi.robot.robot import Robot
 from hovi.schemes import galerkin
 from oracles.ipopt_oracle import least_action
@@ -48,22 +42,26 @@ def largest_excess(trajectory: Trajectory, limits: Limits, samples: int = 10_000
 
 
 @pytest.mark.parametrize(
-    ("name", "limits", "known", "most_steps"),
-    [("ur5_reach", UR5, 694.1903, 42), ("panda_reach", PANDA, 343.08, 72)],
+    ("name", "limits", "known", "most_more", "most_steps"),
+    [("ur5_reach", UR5, 694.1903, 3e-3, 42), ("panda_reach", PANDA, 343.1333, 0.015, 72)],
 )
-def test_at_the_points_the_least_cost_is_that_of_ipopt(
-    models: Path, name: str, limits: dict[str, object], known: float, most_steps: int
+def test_the_least_cost_is_little_more_than_that_of_ipopt_at_the_points(
+    models: Path,
+    name: str,
+    limits: dict[str, object],
+    known: float,
+    most_more: float,
+    most_steps: int,
 ) -> None:
     problem = reach(models, name, limits)
     assert problem.limits is not None
-    objective = BoundedAction(problem, problem.limits)
-    outcome = minimize_bounded(objective, guess_path(problem, "cubic"), Criteria())
-    assert outcome.why is Reason.STATIONARY
-    assert outcome.feasible
-    assert outcome.iterations <= most_steps
-    assert outcome.outputs.value <= known * (1 + 1e-7)
-    cost, _ = least_action(problem, outcome.x, move=0.0)
-    assert outcome.outputs.value == pytest.approx(cost, rel=1e-7)
+    found = solve(problem)
+    assert found.success, found.message
+    assert found.nit <= most_steps
+    assert found.problem is not None
+    cost, _ = least_action(found.problem, found.trajectory.path, move=0.0)
+    assert cost <= known * (1 + 1e-7)
+    assert cost * (1 - 1e-7) <= found.cost <= cost * (1 + most_more)
 
 
 @pytest.mark.parametrize(
@@ -93,16 +91,16 @@ def test_limits_hold_at_ten_thousand_samples(models: Path, name: str) -> None:
 
 
 def test_inactive_limits_change_nothing(models: Path) -> None:
-    free = solve_on_grid(reach(models, "two_link_reach", {"base": "none"}))
-    wide = solve_on_grid(reach(models, "two_link_reach", {"base": "none", "q": 12.0, "tau": 1e4}))
+    free = solve(reach(models, "two_link_reach", {"base": "none"}))
+    wide = solve(reach(models, "two_link_reach", {"base": "none", "q": 12.0, "tau": 1e4}))
     assert wide.cost == pytest.approx(free.cost, rel=1e-9)
     np.testing.assert_allclose(wide.trajectory.q, free.trajectory.q, atol=1e-6)
 
 
 def test_active_limits_raise_the_cost_and_are_reached(models: Path) -> None:
-    free = solve_on_grid(reach(models, "two_link_reach", {"base": "none"}))
+    free = solve(reach(models, "two_link_reach", {"base": "none"}))
     limits = {"base": "none", "v": [3.0, 6.0]}
-    bound = solve_on_grid(reach(models, "two_link_reach", limits))
+    bound = solve(reach(models, "two_link_reach", limits))
     assert bound.success
     assert bound.cost > 1.1 * free.cost
     assert np.abs(bound.trajectory.v).max(axis=0) == pytest.approx([3.0, 6.0], rel=2e-2)
@@ -111,7 +109,7 @@ def test_active_limits_raise_the_cost_and_are_reached(models: Path) -> None:
 def test_a_hard_range_is_the_limit_of_a_narrower_potential(models: Path) -> None:
     """The paper's potential, ten times as steep, costs less the narrower its bend is."""
     task = hovi.load_task(models / "two_link_elbow.toml")
-    grid = Grid.uniform(task.duration, 200, hovi.schemes.by_name("galerkin-2x8"))
+    grid = Grid.uniform(task.duration, 100, hovi.schemes.by_name("galerkin-2x8"))
     robot, ends = task.scene.robot, (task.start, task.goal)
     elbow = (0.0, np.radians(170.0))
     hard = as_limits(robot, {"base": "none", "q": {"elbow": elbow}})
@@ -120,7 +118,7 @@ def test_a_hard_range_is_the_limit_of_a_narrower_potential(models: Path) -> None
     def planned(effects: list[object], limits: Limits | None, guess: Trajectory | str) -> Solution:
         scene = hovi.Scene(robot, effects)
         ld = DiscreteLagrangian(scene.effort_lagrangian(), grid)
-        solution = solve_on_grid(TrajectoryProblem(ld, *ends, limits), guess)
+        solution = solve(TrajectoryProblem(ld, *ends, limits), guess)
         assert solution.success, solution.message
         return solution
 
@@ -183,8 +181,8 @@ def test_a_motion_with_a_weak_motor_is_found_on_every_grid(
 
 def test_time_and_iteration_limits_have_their_own_statuses(models: Path) -> None:
     problem = reach(models, "ur5_reach", UR5)
-    assert solve_on_grid(problem, max_iterations=3).status is Status.ITERATION_LIMIT
-    assert solve_on_grid(problem, time_limit=1e-4).status is Status.TIME_LIMIT
+    assert solve(problem, max_iterations=3).status is Status.ITERATION_LIMIT
+    assert solve(problem, time_limit=1e-4).status is Status.TIME_LIMIT
 
 
 def test_light_wrists_hold_their_velocity_limits_at_the_ends() -> None:
@@ -231,7 +229,7 @@ def test_a_barrier_that_fell_too_early_rises_again(ur5: Robot) -> None:
         scene.effort_lagrangian(), Grid.uniform(3.53, 16, galerkin(4, points=10))
     )
     problem = TrajectoryProblem(ld, start, goal, as_limits(ur5, {"base": "urdf"}))
-    found = solve_on_grid(problem)
+    found = solve(problem)
     assert found.status is Status.MINIMUM
     assert found.cost == pytest.approx(744.6, rel=1e-3)
     assert found.nit < 200

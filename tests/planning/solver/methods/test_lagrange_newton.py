@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from functools import cache
 from itertools import pairwise
 
@@ -11,11 +12,7 @@ import pinocchio as pin
 import pytest
 
 import hovi
-from hovi.optimize.ended import Iteration
-from hovi.planning.solver.methods.augmented_lagrangian import AugmentedLagrangian
-from hovi.planning.solver.methods.lagrange_newton import LagrangeNewton
-from hovi.planning.solver.solver import solve_on_grid
-from hovi.planning.solver.status import Status
+from hovi import Status, solve
 
 SWING_UPS = ("acrobot_swing_up", "pendubot_swing_up", "cart_pole_swing_up")
 SCHEMES = ("galerkin-2", "galerkin-2x8")
@@ -32,7 +29,7 @@ def swing_up(scene: str, scheme: str, intervals: int = 40) -> hovi.Solution:
     task = hovi.load_task(hovi.example(scene))
     grid = hovi.Grid.uniform(task.duration, intervals, hovi.schemes.by_name(scheme))
     ld = hovi.DiscreteLagrangian(task.scene.effort_lagrangian(), grid)
-    return solve_on_grid(hovi.TrajectoryProblem(ld, task.start, task.goal))
+    return solve(hovi.TrajectoryProblem(ld, task.start, task.goal))
 
 
 @cache
@@ -65,7 +62,8 @@ def test_a_swing_up_takes_no_more_steps_than_one_and_a_half_times_ipopt(
     scene: str, scheme: str
 ) -> None:
     found = swing_up(scene, scheme)
-    assert found.status is Status.MINIMUM
+    assert found.status in ("minimum", "unresolved")  # the acrobot's joint spins
+    assert found.n_neg == 0
     assert found.nit == len(found.history) <= 1.5 * IPOPT_STEPS[scene]
 
 
@@ -127,7 +125,6 @@ def test_the_last_steps_converge_quadratically(scene: str, scheme: str) -> None:
     last = [step for step in swing_up(scene, scheme).history if step.decrease < 1e-3]
     assert len(last) >= 3
     for before, after in pairwise(last):
-        assert isinstance(after, Iteration)
         assert after.ratio == 1.0
         assert after.shift == 0.0
         assert np.log(after.decrease) < 1.3 * np.log(before.decrease) or after.decrease < 1e-11
@@ -139,32 +136,44 @@ def test_a_solution_on_a_coarser_grid_is_followed_in_a_few_steps(scene: str) -> 
     coarse = swing_up(scene, "galerkin-2")
     fine = swing_up(scene, "galerkin-2", 160).problem
     assert fine is not None
-    found = solve_on_grid(fine, coarse.trajectory)
+    found = solve(fine, coarse.trajectory)
     assert found.success
     assert found.cost == pytest.approx(coarse.cost, rel=1e-3)
     assert found.nit <= 6
 
 
 @pytest.mark.parametrize("kind", ["pose", "position", "via"])
-def test_frame_goals_and_via_points_have_the_minimum_of_the_rounds(kind: str) -> None:
+def test_momenta_change_at_a_frame_goal_by_forces_on_its_frame_alone(kind: str) -> None:
+    """J^T f with the frame's Jacobian: the natural condition of what the goal leaves free."""
     if kind == "via":
         via = (hovi.Via(0.75, hovi.FrameGoal("tool0", position=place(HALFWAY))),)
         problem = reach(hovi.State(END), via)
     else:
-        model = arm().model
-        data = model.createData()
-        pin.framesForwardKinematics(model, data, END)
-        pose = data.oMf[model.getFrameId("tool0")]
+        pose = tool(END)
         goal = {"pose": pose} if kind == "pose" else {"position": pose.translation}
         problem = reach(hovi.FrameGoal("tool0", **goal))
-    near = solve_on_grid(problem, method=AugmentedLagrangian())
-    found = solve_on_grid(problem, near.trajectory, method=LagrangeNewton())
-    assert found.success
-    assert found.nit <= 3
-    assert found.cost == pytest.approx(near.cost, rel=1e-10)
+    found = solve(problem)
+    assert found.usable, found.message
+    assert found.n_neg == 0
     node = 8 if kind == "via" else 16
     target = HALFWAY if kind == "via" else END
     np.testing.assert_allclose(place(found.trajectory.q[node]), place(target), rtol=0, atol=1e-10)
+    D = problem.ld.derivatives(found.trajectory.path)
+    if kind == "via":
+        change, rate = D[node - 1, 2] + D[node, 0], D[node - 1, 3] + D[node, 1]
+        assert np.abs(rate).max() < 1e-7 * np.abs(D).max()
+    else:
+        change = D[-1, 2]
+    model, rows = arm().model, slice(0, 6 if kind == "pose" else 3)
+    frame, world = model.getFrameId("tool0"), pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+    q = found.trajectory.q[node]
+    J = pin.computeFrameJacobian(model, model.createData(), q, frame, world)[rows]
+    force, *_ = np.linalg.lstsq(J.T, change)
+    assert np.abs(change).max() > 1.0
+    np.testing.assert_allclose(J.T @ force, change, rtol=0, atol=1e-6 * np.abs(change).max())
+    again = solve(problem, found.trajectory)
+    assert again.nit <= 3
+    assert again.cost == pytest.approx(found.cost, rel=1e-10)
 
 
 def rod(load: float, held: bool) -> hovi.TrajectoryProblem:
@@ -181,8 +190,8 @@ def rod(load: float, held: bool) -> hovi.TrajectoryProblem:
 def test_the_index_of_a_held_rod_is_the_number_of_ways_it_can_buckle(load: float) -> None:
     """Holding its midpoint takes the first way, which bends it there, and leaves the others."""
     ways = sum(load > critical for critical in BUCKLING)
-    free = solve_on_grid(rod(load, held=False), escape_saddles=False)
-    held = solve_on_grid(rod(load, held=True), escape_saddles=False)
+    free = solve(rod(load, held=False), escape_saddles=False)
+    held = solve(rod(load, held=True), escape_saddles=False)
     assert free.n_neg == ways
     assert held.n_neg == max(ways - 1, 0)
     assert held.status is (Status.SADDLE if ways > 1 else Status.MINIMUM)
@@ -190,7 +199,7 @@ def test_the_index_of_a_held_rod_is_the_number_of_ways_it_can_buckle(load: float
 
 
 def test_a_held_rod_buckles_where_saddles_are_left() -> None:
-    found = solve_on_grid(rod(100.0, held=True))
+    found = solve(rod(100.0, held=True))
     assert found.status is Status.MINIMUM
     assert found.cost < -1.0
     assert "A saddle of cost 0 was left" in found.message
@@ -200,6 +209,18 @@ def test_a_held_rod_buckles_where_saddles_are_left() -> None:
     assert np.abs(q).max() > 0.05
 
 
+@pytest.mark.parametrize("load", [30.0, 60.0, 100.0])
+def test_a_rod_within_limits_buckles_too(load: float) -> None:
+    """Straight it is stationary within them."""
+    problem = rod(load, held=False)
+    limits = hovi.as_limits(problem.coordinates, {"base": "none", "v": 5.0})
+    found = solve(dataclasses.replace(problem, limits=limits))
+    assert found.success, found.message
+    straight = load < BUCKLING[0]
+    assert (np.abs(found.trajectory.q).max() < 1e-6) == straight
+    assert (found.cost < -0.1) == (not straight)
+
+
 def test_via_points_that_contradict_each_other_are_infeasible() -> None:
     """And in a fraction of the steps that the rounds take to give up."""
     at = place(HALFWAY)
@@ -207,7 +228,7 @@ def test_via_points_that_contradict_each_other_are_infeasible() -> None:
         hovi.Via(0.75, hovi.FrameGoal("tool0", position=at + np.array([x, 0, 0])))
         for x in (0, 0.05)
     ]
-    found = solve_on_grid(reach(hovi.State(END), tuple(via)), max_iterations=400)
+    found = solve(reach(hovi.State(END), tuple(via)), max_iterations=400)
     assert found.status is Status.INFEASIBLE
     assert "the goal at t = 0.75 s cannot be met: frame 'tool0' misses it by" in found.message
     middle = place(found.trajectory.q[8])
@@ -218,7 +239,7 @@ def test_via_points_that_contradict_each_other_are_infeasible() -> None:
 def test_a_search_that_is_cut_short_says_what_remains(limit: dict[str, float]) -> None:
     problem = swing_up("pendubot_swing_up", "galerkin-2").problem
     assert problem is not None
-    found = solve_on_grid(problem, **limit)
+    found = solve(problem, **limit)
     assert found.status in (Status.ITERATION_LIMIT, Status.TIME_LIMIT)
     assert found.nit <= 3
 
@@ -227,7 +248,7 @@ def test_steps_are_reported_as_they_are_counted() -> None:
     problem = swing_up("pendubot_swing_up", "galerkin-2").problem
     assert problem is not None
     steps: list[int] = []
-    found = solve_on_grid(problem, report=lambda step, cost: steps.append(step))
+    found = solve(problem, report=lambda step, cost: steps.append(step))
     assert steps == list(range(1, found.nit + 1))
 
 
@@ -242,7 +263,7 @@ def tool(q: np.ndarray) -> pin.SE3:
 @cache
 def posed() -> hovi.Solution:
     """A reach to a pose of the tool."""
-    return solve_on_grid(reach(hovi.FrameGoal("tool0", tool(END))))
+    return solve(reach(hovi.FrameGoal("tool0", tool(END))))
 
 
 def test_replanning_follows_a_frame_goal_in_a_few_steps() -> None:

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from hovi import Status, plan
 from hovi.effects import Custom, Effect
-from hovi.planning.search.planner import plan
-from hovi.planning.solver.status import Status
 from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
 
