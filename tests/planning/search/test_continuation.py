@@ -2,26 +2,22 @@
 
 from __future__ import annotations
 
-import dataclasses
+from collections.abc import Callable
+from time import monotonic
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
 import hovi
-from hovi import PlanOptions, Solution, Status, plan
-from hovi.discrete.grid import DiscretePath, Grid
-from hovi.discrete.state import State
+from hovi import Solution, Status, plan
 from hovi.effects import Gravity
 from hovi.planning.problem.limits import as_limits
-from hovi.planning.search.continuation import may_help, solve_by_continuation
-from hovi.planning.search.job import Job
-from hovi.planning.solver.action_objective import ActionObjective
+from hovi.scene.effort_lagrangian import EffortLagrangian
 from hovi.scene.scene import Scene
-from hovi.schemes import galerkin
-from hovi.system.deadline import Deadline
+from hovi.system import deadline
 from hovi.system.interruption import interrupted, interruptible
-from oracles.on_grid import solve_on_grid
 from samples.paper_arm import HANG, REACH_Q
 from samples.uneven_chain import uneven_chain
 
@@ -38,56 +34,62 @@ def light_hand(tmp_path_factory: pytest.TempPathFactory) -> Scene:
     return Scene(uneven_chain([1.0, 1e-6], path), [Gravity(9.8)])
 
 
-@pytest.fixture(scope="module")
-def job(light_hand: Scene) -> Job:
-    grid = Grid.uniform(3.0, 16, galerkin(2))
-    return Job(
-        light_hand,
-        grid,
-        State(HANG),
-        State(-HANG),
-        PlanOptions(max_iterations=STEPS, limits="none"),
-    )
+def swung(scene: Scene, **options: Any) -> Solution:
+    given = GRID | {"max_iterations": STEPS, "self_collision": False} | options
+    return plan(scene, HANG, -HANG, 3.0, **given)
 
 
 @pytest.fixture(scope="module")
-def failed(job: Job) -> Solution:
-    return solve_on_grid(job.problem(), max_iterations=STEPS)
+def failed(light_hand: Scene) -> Solution:
+    """By the direct solve alone."""
+    return swung(light_hand, continuation=False)
+
+
+class Reports:
+    """The lines of text of a plan with their fractions; calls `act` at the first continuation."""
+
+    def __init__(self, act: Callable[[], None] = lambda: None) -> None:
+        self.continued: list[tuple[str, float]] = []
+        self._act = act
+
+    def __call__(self, text: str, fraction: float) -> None:
+        if text.startswith("continuation"):
+            self.continued.append((text, fraction))
+            if len(self.continued) == 1:
+                self._act()
 
 
 def test_masses_of_a_million_to_one_are_solved_with_decreasing_rotor_inertia(
-    job: Job, failed: Solution
+    light_hand: Scene, failed: Solution
 ) -> None:
+    """A minimum of the task itself, without rotors, on a grid that does not resolve it."""
     assert failed.status is Status.ITERATION_LIMIT
-    found = solve_by_continuation(job, failed)
-    assert found.status is Status.MINIMUM
+    reports = Reports()
+    found = swung(light_hand, progress=reports)
+    assert "the motion is a minimum on 16 intervals" in found.message
     assert found.n_neg == 0
-    assert found.minima == (found.cost,)
-    assert (
-        "The direct solve ended in iteration_limit; continuation in inertia found" in found.message
-    )
-    assert not job.scene.model.armature.any()
-    again = solve_on_grid(job.problem(), found.trajectory)
+    assert found.cost < failed.cost
+    assert found.problem is not None
+    assert not found.problem.scene.model.armature.any()
+    again = hovi.solve(found.problem, found.trajectory)
     assert again.nit <= 2
     assert again.cost == pytest.approx(found.cost, rel=1e-9)
-    assert again.n_neg == 0
+    texts, shares = zip(*reports.continued, strict=True)
+    assert list(shares) == sorted(shares)
+    assert 0 <= shares[0] <= shares[-1] <= 1
+    rotors = [float(text.split()[5]) for text in texts[:-1] if "rotors" in text]
+    np.testing.assert_allclose(np.divide(rotors[:-1], rotors[1:]), 10.0, rtol=0.1)
+    assert texts[-1] == "continuation in inertia: the task itself"
 
 
 def test_a_plan_without_continuation_is_one_solve(light_hand: Scene, failed: Solution) -> None:
-    found = plan(
-        light_hand,
-        HANG,
-        -HANG,
-        3.0,
-        continuation=False,
-        max_iterations=STEPS,
-        **GRID,
-        self_collision=False,
-    )
-    assert (found.status, found.cost, found.message) == (
-        failed.status,
-        failed.cost,
-        failed.message,
+    assert failed.problem is not None
+    direct = hovi.solve(failed.problem, max_iterations=STEPS)
+    assert (failed.status, failed.cost, failed.message, failed.nit) == (
+        direct.status,
+        direct.cost,
+        direct.message,
+        STEPS,
     )
 
 
@@ -98,90 +100,79 @@ def test_a_valley_of_positive_curvature_gets_more_steps(arm_scene: Scene) -> Non
     found = plan(arm_scene, HANG, REACH_Q, 1.0, max_iterations=5, **GRID)
     assert found.status is Status.MINIMUM
     assert "continuation in steps found this minimum in 1 stage and" in found.message
+    assert found.cost == pytest.approx(plan(arm_scene, HANG, REACH_Q, 1.0, **GRID).cost, rel=1e-9)
 
 
-@pytest.mark.parametrize("status", [Status.ITERATION_LIMIT, Status.DIVERGED])
-def test_among_obstacles_a_motion_at_its_iteration_limit_gets_more_steps_first(
-    status: Status,
-) -> None:
+def test_among_obstacles_a_motion_at_its_iteration_limit_gets_more_steps_first() -> None:
     robot = hovi.load_robot("ur5")
-    start, ball = robot.neutral(), hovi.Sphere([5.0, 0.0, 0.0], 0.1, name="ball")
-    ends = State(start), State(start + 0.5)
-    options = PlanOptions(limits="none", obstacles=(ball,))
-    beside = Job(Scene(robot, []), Grid.uniform(1.0, 4, galerkin(2)), *ends, options)
-    ended = dataclasses.replace(solve_on_grid(beside.problem()), status=status, n_neg=-1)
-    first = list[str]()
-
-    def report(text: str, share: float) -> None:
-        first.append(text)
-        raise KeyboardInterrupt
-
-    solve_by_continuation(beside, ended, progress=report)
-    assert ("more steps" in first[0]) == (status is Status.ITERATION_LIMIT)
+    start, ball = np.array([0.0, -1.2, 1.2, -0.5, 0.3, 0.1]), hovi.Sphere([0.6, 0.3, 0.4], 0.05)
+    reports, few = Reports(), {"max_iterations": 2, "self_collision": False, "starts": 1}
+    plan(Scene(robot), start, start + 0.6, 1.0, obstacles=[ball], **few, **GRID, progress=reports)
+    assert "more steps" in reports.continued[0][0]
 
 
-def test_every_stage_is_reported_with_increasing_progress(job: Job, failed: Solution) -> None:
-    reports: list[tuple[str, float]] = []
-    found = solve_by_continuation(
-        job, failed, progress=lambda text, share: reports.append((text, share))
-    )
-    assert found.success
-    shares = [share for _, share in reports]
-    assert shares == sorted(shares)
-    assert 0 <= shares[0] <= shares[-1] <= 1
-    assert "continuation in inertia: rotors of" in reports[0][0]
-    assert reports[-1][0].endswith("the task itself")
+# Ends before a minimum
 
 
-def test_a_deadline_ends_the_continuation_with_the_best_so_far(job: Job, failed: Solution) -> None:
-    late = solve_by_continuation(job, failed, deadline=Deadline(0.0))
-    assert (late.success, late.status) == (False, Status.TIME_LIMIT)
-    assert late.cost == failed.cost
-    assert "Continuation in inertia reached the time limit" in late.message
+def test_a_deadline_ends_the_continuation_with_the_best_so_far(
+    light_hand: Scene, failed: Solution, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A clock that leaps at the first stage."""
+    leap = 0.0
+
+    def late() -> None:
+        nonlocal leap
+        leap = 1e6
+
+    monkeypatch.setattr(deadline, "time", SimpleNamespace(monotonic=lambda: monotonic() + leap))
+    found = swung(light_hand, time_limit=1e5, progress=Reports(late))
+    assert (found.success, found.status) == (False, Status.TIME_LIMIT)
+    assert found.cost == failed.cost
+    assert "Continuation in inertia reached the time limit" in found.message
 
 
 @pytest.mark.parametrize("where", ["within a stage", "between two"])
 def test_an_interrupt_ends_the_continuation_with_the_best_so_far(
-    job: Job, failed: Solution, monkeypatch: pytest.MonkeyPatch, where: str
+    light_hand: Scene, failed: Solution, monkeypatch: pytest.MonkeyPatch, where: str
 ) -> None:
-    value, calls = ActionObjective.value, 0
+    output, calls = EffortLagrangian.output, -1_000_000
 
-    def interrupted(self: ActionObjective, x: DiscretePath) -> float:
+    def interrupting(self: EffortLagrangian, *jet: Any, **more: Any) -> Any:
         nonlocal calls
         calls += 1
         if calls == 30:
             raise KeyboardInterrupt
-        return value(self, x)
+        return output(self, *jet, **more)
 
-    def interrupt(text: str, share: float) -> None:
-        raise KeyboardInterrupt
+    def act() -> None:
+        nonlocal calls
+        calls = 0
+        if where == "between two":
+            raise KeyboardInterrupt
 
-    monkeypatch.setattr(ActionObjective, "value", interrupted)
-    found = solve_by_continuation(
-        job, failed, progress=interrupt if where == "between two" else None
-    )
+    monkeypatch.setattr(EffortLagrangian, "output", interrupting)
+    found = swung(light_hand, progress=Reports(act))
     assert (found.success, found.status) == (False, Status.INTERRUPTED)
     assert found.cost == failed.cost
     assert "was interrupted" in found.message
-    assert calls <= 31
+    assert 0 <= calls <= 60
 
 
-def test_an_interrupt_between_two_stages_ends_the_whole_call(job: Job, failed: Solution) -> None:
-    def interrupt(text: str, share: float) -> None:
+def test_an_interrupt_between_two_stages_ends_the_whole_call(light_hand: Scene) -> None:
+    def interrupt() -> None:
         raise KeyboardInterrupt
 
     @interruptible
     def call() -> bool:
-        solve_by_continuation(job, failed, progress=interrupt)
+        swung(light_hand, progress=Reports(interrupt))
         return interrupted()
 
     assert call()
 
 
-def test_a_continuation_that_fails_names_what_was_tried(job: Job) -> None:
-    hurried = job.with_options(max_iterations=2)
-    failed = solve_on_grid(hurried.problem(), max_iterations=2)
-    found = solve_by_continuation(hurried, failed)
+def test_a_continuation_that_fails_names_what_was_tried(light_hand: Scene) -> None:
+    failed = swung(light_hand, max_iterations=2, continuation=False)
+    found = swung(light_hand, max_iterations=2)
     assert (found.success, found.status) == (False, Status.ITERATION_LIMIT)
     assert found.cost <= failed.cost
     assert found.nit == 2
@@ -190,14 +181,9 @@ def test_a_continuation_that_fails_names_what_was_tried(job: Job) -> None:
 
 
 def test_problems_that_fail_before_any_step_are_not_continued(arm_scene: Scene) -> None:
-    limits = as_limits(arm_scene.robot, {"base": "none", "v": 0.1})
-    grid = Grid.uniform(1.0, 8, galerkin(2))
-    job = Job(
-        arm_scene, grid, State(HANG), State(-HANG), PlanOptions(max_iterations=50, limits=limits)
-    )
-    contradiction = solve_on_grid(job.problem())
-    assert contradiction.status is Status.INFEASIBLE
-    assert not may_help(contradiction)
-    found = plan(arm_scene, HANG, -HANG, 1.0, limits=limits)
+    limits, reports = as_limits(arm_scene.robot, {"base": "none", "v": 0.1}), Reports()
+    found = plan(arm_scene, HANG, -HANG, 1.0, limits=limits, progress=reports)
+    assert (found.status, found.nit) == (Status.INFEASIBLE, 0)
     assert "ontinuation" not in found.message
+    assert reports.continued == []
     assert np.isfinite(found.cost)
