@@ -18,14 +18,6 @@ import hovi
 from hovi import PlanOptions
 from hovi.discrete.state import State
 from hovi.errors import HoviError, InputError, SceneError
-from hovi.planning.search.homotopies import (
-    finer_grids,
-    growing_gravity,
-    lighter_rotors,
-    narrowing_limits,
-    other_durations,
-)
-from hovi.planning.search.job import Job
 from hovi.planning.sequence.branches import Leg, chosen_branches
 from hovi.planning.sequence.segment import Segment
 from hovi.planning.sequence.sequence_job import job_of
@@ -421,36 +413,24 @@ def test_several_starts_find_the_same_with_any_number_of_processes() -> None:
     assert one.cost <= planned().cost * 1.01
 
 
-def test_easier_problems_of_a_sequence_are_sequences() -> None:
-    limits = {"base": "none", "tau": [25.0, 12.0]}
-    given = segments(limits={"base": "none", "v": 20.0})
-    goals = [State(GRAB), State(PUT), State([0.0, 0.0])]
-    options = PlanOptions(limits=limits, intervals=24).on(scene())
-    job = job_of(scene(), State([0.0, 0.0]), goals, given, options)
-    stages = [
-        (each, stage.job)
-        for each in (
-            lighter_rotors,
-            growing_gravity,
-            other_durations,
-            finer_grids,
-            narrowing_limits,
-        )
-        for stage in each(job)
-    ]
-    assert {each for each, _ in stages} > {other_durations, narrowing_limits, finer_grids}
-    for homotopy, easier in stages:
-        problem = easier.problem()
-        share = easier.grid.duration / job.grid.duration
-        assert [each.time for each in problem.holds] == pytest.approx([0.6 * share, 1.5 * share])
-        assert problem.limits is not None
-        first, last = problem.limits.parts[0].bounded, problem.limits.parts[1].bounded
-        assert first[1].all()
-        assert last[3].all() == (homotopy is not lighter_rotors)
-    wide = narrowing_limits(job)[0].job.problem().limits
-    assert wide is not None
-    assert wide.parts[0].upper[1, 0] == pytest.approx(8 * 20.0)
-    assert isinstance(job, Job)
+@pytest.mark.parametrize(
+    ("limits", "ways"),
+    [("none", {"steps"}), ({"base": "none", "tau": [60.0, 40.0]}, {"the limits"})],
+)
+def test_easier_problems_of_a_sequence_are_sequences(limits: Any, ways: set[str]) -> None:
+    """Their motions lead to one that meets where segments do, as one that is found at once."""
+    said: list[str] = []
+    given: dict[str, Any] = {"limits": limits, "intervals": 24, "self_collision": False}
+    hurried = {"max_iterations": 3, "progress": lambda text, share: said.append(text)}
+    found = hovi.plan_sequence(scene(), [0.0, 0.0], segments(), **given, **hurried)
+    easier = {text.split(":")[0].removeprefix("continuation in ") for text in said if ":" in text}
+    assert ways <= easier
+    assert found.success, found.message
+    meets = found.trajectory.sample([0.6, 1.5])
+    np.testing.assert_allclose(meets.q, [GRAB, PUT], atol=1e-9)
+    np.testing.assert_allclose(meets.v, 0.0, atol=1e-9)
+    at_once = hovi.plan_sequence(scene(), [0.0, 0.0], segments(), **given)
+    assert found.cost == pytest.approx(at_once.cost, rel=1e-3)
 
 
 def test_a_segment_that_cannot_be_is_named_before_solving() -> None:
