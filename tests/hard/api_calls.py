@@ -480,7 +480,7 @@ def _problems() -> list[Call]:
             obstacles=[{"kind": "sphere", "position": [5.0, 0.0, 0.0], "radius": 0.1}],
         ),
         own(frame_goal, "check", robot()),
-        own(frame_goal, "condition", robot()),
+        own(frame_goal, "difference", robot()),
         build(hovi.Via, time=0.5, goal=goal),
         call(hovi.Tolerance.of, "1 mm", robot()),
         own(hovi.Tolerance.of("1 mm", robot()), "in_words", 1e-3, "tip"),

@@ -146,6 +146,11 @@ class FrameGoal:
         self.check(robot)
         return PoseDifference(self, robot)
 
+    def condition(self, robot: Robot) -> PoseDifference:
+        """`difference` by its former name."""
+        warn("`condition` of a frame goal is now `difference`: use it.", DeprecationWarning)
+        return self.difference(robot)
+
     @property
     def directions(self) -> tuple[Array, Array] | None:
         """The axis: unit vectors (3,) in the frame and in the world; None if there is none."""
