@@ -19,7 +19,7 @@ from hovi.checks.directions import unit_vector
 from hovi.checks.shapes import numbers_of
 from hovi.dynamics.point_function import PointFunction
 from hovi.dynamics.symbolic_dynamics import casadi_functions
-from hovi.errors import InputError, nearest
+from hovi.errors import InputError, nearest, warn
 from hovi.planning.conditions.function import Curvature, Function, Points, Slopes
 from hovi.planning.problem.kinematics.orientation import ORIENTATIONS, rotation_from
 from hovi.robot.robot import Robot
