@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from typing import Any
 
 import numpy as np
@@ -10,15 +9,7 @@ import pytest
 
 import hovi
 from hovi import Solution, Status
-from hovi.discrete.grid import Grid
-from hovi.planning.search.free_duration import BestDuration, FreeDuration, SolveFor
-from hovi.planning.search.joint_duration import (
-    best_duration_by,
-    best_on_its_grid,
-    is_best,
-    joint_minimum,
-    unless_best,
-)
+from hovi.scene.effort_lagrangian import EffortLagrangian
 from oracles.on_grid import solve_on_grid
 
 SCENES = {
@@ -148,109 +139,88 @@ def test_minima_of_a_coarse_grid_keep_their_durations_on_the_requested_one() -> 
     assert abs(fine.duration_derivative + 20.0) <= 1e-7 * 20.0
 
 
-def test_no_joint_minimum_is_none() -> None:
-    """A motion that ends beyond its limits has none, whatever its duration."""
-    ends, _ = ends_of("two_link_reach")
-    limits = {"base": "none", "q": [[-0.1, 0.1], [-0.1, 0.1]]}
-    problem = hovi.plan(*ends, 1.0, intervals=8, limits=limits, continuation=False).problem
-    assert problem is not None
-    free = FreeDuration(0.5, 4.0, 20.0)
-    assert joint_minimum(free, problem, problem.guess("cubic"), 500, None) is None
+# Ends of the search
 
 
-def fixed_solution(T: float) -> Solution:
-    ends, options = ends_of("two_link_reach")
-    return hovi.plan(*ends, T, intervals=8, **options)
+def freed(bounds: Any, weight: float = 20.0, **options: Any) -> Solution:
+    """The reach of the two-link arm, of which J + 20 T has its minimum at 1.19 s."""
+    ends, given = ends_of("two_link_reach")
+    return hovi.plan(*ends, bounds, time_weight=weight, **(given | {"intervals": 8} | options))
 
 
-def test_without_a_joint_minimum_durations_are_searched_for() -> None:
-    first, asked = fixed_solution(1.4), []
-
-    def solve(T: float, guess: hovi.Trajectory) -> Solution:
-        asked.append(T)
-        assert first.problem is not None
-        return solve_on_grid(first.problem.on(first.problem.grid.stretched(T)), guess)
-
-    free = FreeDuration(0.5, 4.0, 20.0)
-    best = best_duration_by(free, solve, first, jointly=lambda _: None)
-    assert best.solution.success
-    assert len(asked) > 3
-    assert best.solution.duration_derivative == pytest.approx(-20.0, rel=1e-8)
-    again = best_duration_by(free, solve, best.solution, jointly=lambda _: pytest.fail("solved"))
-    assert again.solution is best.solution
-    assert again.ending == "The best duration is"
-
-
-def test_a_stopped_joint_solve_is_told_as_no_success() -> None:
-    first = fixed_solution(1.4)
-    for status, words in ((Status.TIME_LIMIT, "time limit"), (Status.INTERRUPTED, "interrupted")):
-        stopped = dataclasses.replace(first, success=False, status=status)
-        best = best_duration_by(
-            FreeDuration(0.5, 4.0, 20.0), _unasked, first, jointly=lambda _, s=stopped: s
-        )
-        found = best.with_time()
-        assert (found.success, found.status) == (False, status)
-        assert words in found.message
-        assert found.nit == 2 * first.nit
-
-
-def _unasked(T: float, guess: hovi.Trajectory) -> Solution:
-    raise AssertionError(f"a solve for {T} s from one of {guess.duration} s")
+@pytest.mark.parametrize("weight", [5.0, 20.0, 200.0])
+@pytest.mark.parametrize("limits", ["none", {"base": "none", "v": 3.5}])
+def test_the_best_duration_is_cheaper_than_those_around_it(weight: float, limits: Any) -> None:
+    """By plans for fixed durations, and by the slope of the cost where it is smooth."""
+    free = freed((0.5, 4.0), weight, limits=limits)
+    assert free.success, free.message
+    T = free.trajectory.duration
+    ends, given = ends_of("two_link_reach")
+    for other in np.clip(T * np.array([0.95, 0.98, 1.02, 1.05]), 0.5, 4.0):
+        fixed = hovi.plan(*ends, other, **(given | {"intervals": 8, "limits": limits}))
+        if fixed.success and other != T:
+            assert fixed.cost + weight * other > free.cost * (1 - 1e-6)
+    if 0.5 < T < 4.0:
+        assert free.duration_derivative == pytest.approx(-weight, rel=1e-6)
 
 
 @pytest.mark.parametrize("T", [0.6, 1.19, 2.0])
 def test_a_motion_at_a_bound_is_the_best_only_if_shorter_or_longer_ones_are_beyond(
     T: float,
 ) -> None:
-    """J + w T has its minimum at 1.19 s."""
-    first = fixed_solution(T)
-    slope = first.duration_derivative + 20.0
     for bounds in ((T, 2 * T), (T / 2, T)):
-        outward = (slope > 0) == (bounds[0] == T) and not np.isclose(slope, 0.0)
-        solved: list[Solution] = []
-        best = best_duration_by(
-            FreeDuration(*bounds, 20.0), _unasked, first, jointly=_record(first, solved)
-        )
-        assert (len(solved) == 0) == outward
-        assert ("kept at its bound" in best.ending) == outward or len(solved) == 1
+        free = freed(bounds)
+        assert free.success, free.message
+        outward = (T > 1.2) == (bounds[0] == T) and not np.isclose(T, 1.19, atol=0.01)
+        kept = free.trajectory.duration == pytest.approx(T, rel=1e-12)
+        assert ("kept at its bound" in free.message) == kept
+        if not np.isclose(T, 1.19, atol=0.01):
+            assert kept == outward
+        slope = free.duration_derivative + 20.0
+        assert kept or abs(slope) <= 1e-6 * 20.0
+        assert not kept or (slope >= 0) == (bounds[0] == T)
 
 
-def _record(first: Solution, solved: list[Solution]) -> Any:
-    def jointly(solution: Solution) -> Solution:
-        solved.append(solution)
-        return first
-
-    return jointly
+def test_ends_beyond_their_limits_have_no_motion_of_any_duration() -> None:
+    limits = {"base": "none", "q": [[-0.1, 0.1], [-0.1, 0.1]]}
+    found = freed((0.5, 4.0), limits=limits)
+    assert (found.success, found.status) == (False, Status.INFEASIBLE)
 
 
-def test_next_to_a_jump_of_the_cost_the_slope_is_small_without_vanishing() -> None:
-    first = fixed_solution(1.4)
-    rate = first.duration_derivative
-    for share, at_jump, best in ((1e-3, True, True), (1e-3, False, False), (0.1, True, False)):
-        free = FreeDuration(0.5, 4.0, abs(rate) * (1 + share))
-        found = BestDuration(free, first, 1, "The best duration is", at_jump=at_jump)
-        assert is_best(found) == best
-        told = unless_best(found)
-        assert told.solution.success == best
-        assert best or "shorter durations cost less by" in told.with_time().message
+def test_an_interrupt_is_told_as_no_success(monkeypatch: pytest.MonkeyPatch) -> None:
+    """In the first solve, and in those for other durations."""
+    output, calls, last = EffortLagrangian.output, 0, -1
+
+    def interrupting(self: EffortLagrangian, *jet: Any, **more: Any) -> Any:
+        nonlocal calls
+        calls += 1
+        if calls == last:
+            raise KeyboardInterrupt
+        return output(self, *jet, **more)
+
+    monkeypatch.setattr(EffortLagrangian, "output", interrupting)
+    assert freed((0.5, 4.0)).success
+    whole = calls
+    for share in (0.2, 0.5, 0.9):
+        calls, last = 0, int(share * whole)
+        found = freed((0.5, 4.0))
+        assert (found.success, found.status) == (False, Status.INTERRUPTED)
+        assert "interrupted" in found.message
+        assert 0.5 <= found.trajectory.duration <= 4.0
 
 
-def test_a_search_that_ends_elsewhere_is_repeated_on_the_grid_of_its_motion() -> None:
-    first, grids = fixed_solution(1.4), []
+def test_a_time_limit_is_told_as_no_success() -> None:
+    found = freed((0.5, 4.0), time_limit=1e-9)
+    assert (found.success, found.status) == (False, Status.TIME_LIMIT)
+    assert "time limit" in found.message
 
-    def on_grid(grid: Grid) -> SolveFor:
-        grids.append(grid)
 
-        def solve(T: float, guess: hovi.Trajectory) -> Solution:
-            assert first.problem is not None
-            return solve_on_grid(first.problem.on(grid.stretched(T)), guess)
-
-        return solve
-
-    joint = iter([first, None])  # one that ends where it began, then none
-    found = best_on_its_grid(
-        FreeDuration(0.5, 4.0, 20.0), on_grid, first, jointly=lambda _: next(joint)
-    )
-    assert found.solution.success
-    assert len(grids) == 2
-    assert found.solution.duration_derivative == pytest.approx(-20.0, rel=1e-8)
+@pytest.mark.parametrize("most", [1, 2, 4])
+def test_too_few_steps_are_no_success(most: int) -> None:
+    found = freed((0.5, 4.0), max_iterations=most, continuation=False, intervals=24)
+    assert found.success == (found.status is Status.MINIMUM)
+    if not found.success:
+        assert "a minimum of cost" not in found.message
+        assert found.minima == ()
+    else:
+        assert found.duration_derivative == pytest.approx(-20.0, rel=1e-6)
