@@ -51,11 +51,10 @@ def _finds_hovi(finder: Any) -> bool:
 
 
 class Counter:
-    """Counts the points at which torques are evaluated; None if the kernels are not found."""
+    """Counts the points at which the kernels are evaluated that are found."""
 
     def __init__(self) -> None:
         self.points = 0
-        self.known = False
         for module, name in KERNELS.items():
             try:
                 kernel = getattr(__import__(module, fromlist=[name]), name)
@@ -64,7 +63,6 @@ class Counter:
             for method in EVALUATIONS:
                 if hasattr(kernel, method):
                     setattr(kernel, method, self._counting(getattr(kernel, method)))
-                    self.known = True
 
     def _counting(self, evaluate: Callable[..., Any]) -> Callable[..., Any]:
         def counted(kernel: Any, q: Any, *more: Any, **named: Any) -> Any:
@@ -74,9 +72,9 @@ class Counter:
         return counted
 
     def taken(self) -> int | None:
-        """The points since the last call."""
+        """The points since the last call; None if there are none, as in other processes."""
         points, self.points = self.points, 0
-        return points if self.known else None
+        return points or None
 
 
 class Yardstick:
@@ -97,9 +95,25 @@ class Yardstick:
 
 
 def processor_time() -> float:
-    """Of this process and of those that it has started and that have ended, in [s]."""
-    children = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return time.process_time() + children.ru_utime + children.ru_stime
+    """Of this process and of all that it has started, ended or not, in [s]."""
+    ended = resource.getrusage(resource.RUSAGE_CHILDREN)
+    living = sum(map(_time_with_children, _children(os.getpid())))
+    return time.process_time() + ended.ru_utime + ended.ru_stime + living
+
+
+def _children(process: int) -> list[int]:
+    tasks = Path(f"/proc/{process}/task").glob("*/children")
+    return [int(child) for each in tasks for child in each.read_text().split()]
+
+
+def _time_with_children(process: int) -> float:
+    """Processor time of another process and of those that it has started, in [s]."""
+    try:
+        fields = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
+        living = sum(map(_time_with_children, _children(process)))
+    except OSError:  # it has just ended
+        return 0.0
+    return sum(map(int, fields[11:15])) / os.sysconf("SC_CLK_TCK") + living
 
 
 def cpu_time(work: Callable[[], Any]) -> float:

@@ -132,8 +132,11 @@ def excess(y: Array, lower: Array, upper: Array) -> float:
     return float(outside.max(initial=-np.inf))
 
 
-def denial(motion: Any, cost: float, asked: Asked, samples: int = SAMPLES) -> str:
-    """Why the success of a motion is denied, in a few words; "" if nothing speaks against it."""
+def denial(motion: Any, cost: float | None, asked: Asked, samples: int = SAMPLES) -> str:
+    """Why the success of a motion is denied, in a few words; "" if nothing speaks against it.
+
+    cost: as the solution says; None where it is no integral of torques.
+    """
     checks: tuple[Callable[[], str], ...] = (
         lambda: missed(motion, asked),
         lambda: unlike_its_cost(motion, cost, asked),
@@ -161,7 +164,7 @@ def missed(motion: Any, asked: Asked) -> str:
     return ""
 
 
-def unlike_its_cost(motion: Any, cost: float, asked: Asked) -> str:
+def unlike_its_cost(motion: Any, cost: float | None, asked: Asked) -> str:
     """Which torque passive joints bear, or how the cost differs from the integral on the curve."""
     t, w = gauss_points(np.asarray(motion.t))
     squares = torques_at(asked.parts, t, motion.sample(t)) ** 2
@@ -172,6 +175,8 @@ def unlike_its_cost(motion: Any, cost: float, asked: Asked) -> str:
     borne = float(np.sqrt((w @ squares[:, passive]).sum() / max((w @ squares).sum(), 1e-300)))
     if not borne <= MAX_PASSIVE:
         return f"passive torque {borne:.1e}"
+    if cost is None:
+        return ""
     said = cost - asked.price * float(motion.duration)
     difference = (effort - said) / max(abs(said), 1e-12)
     return "" if abs(difference) <= MAX_DIFFERENCE else f"integral {difference:+.1e}"

@@ -43,10 +43,15 @@ from solving_statements import solving_statements
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
-KINDS = ("limited", "unlimited", "replans", "advances", "swing-ups")
+KINDS = (
+    *("tasks", "limited", "unlimited", "hard", "sequences", "durations", "replans", "advances"),
+    *("swing-ups", "studies"),
+)
 """Classes of problems, as in compared_problems.py."""
 MAX_STEPS, MAX_TIME = 1.05, 1.1
 """Ratios to BEFORE up to which a class passes."""
+LEAST_TIME = 0.5
+"""Times below this are too short to compare, in times of 10,000 points of the kernel."""
 AGAIN = 2
 """How often what is slower is measured again."""
 SHOWN = 8
@@ -288,8 +293,10 @@ def _merge(rows: dict[str, Row], more: dict[str, Row]) -> None:
 
 
 def relative_time(row: Row) -> float | None:
-    """Processor time beside that of the kernel."""
-    return None if row["seconds"] is None else row["seconds"] / row["kernel"]
+    """Processor time next to that of the kernel; what is shorter than it counts as LEAST_TIME."""
+    if row["seconds"] is None:
+        return None
+    return max(float(row["seconds"] / row["kernel"]), LEAST_TIME)
 
 
 def measured(
