@@ -22,6 +22,7 @@ there instead. The exit code is 1 if a class does not pass.
 from __future__ import annotations
 
 import argparse
+import contextlib
 import json
 import os
 import queue
@@ -32,7 +33,6 @@ import tempfile
 import threading
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -79,14 +79,15 @@ class Worker:
         source = str(self._checkout / "src")
         one = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "PYTHONPATH": source}
         command = [sys.executable, "-W", "ignore", str(HERE / "checkout_worker.py")]
-        process = subprocess.Popen(
-            [*command, str(self._checkout)],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=self._log.open("a"),
-            text=True,
-            env=os.environ | one,
-        )
+        with self._log.open("a") as log:
+            process = subprocess.Popen(
+                [*command, str(self._checkout)],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=log,
+                text=True,
+                env=os.environ | one,
+            )
         lines: queue.Queue[str | None] = queue.Queue()
         threading.Thread(target=_forward, args=(process.stdout, lines), daemon=True).start()
         self._lines = lines
@@ -94,10 +95,13 @@ class Worker:
 
     def close(self) -> None:
         """End the process."""
-        if self._process is not None:
-            self._process.kill()
-            self._process.wait()
-            self._process = None
+        process, self._process = self._process, None
+        if process is not None:
+            process.kill()
+            process.wait()
+            assert process.stdin is not None
+            with contextlib.suppress(BrokenPipeError):
+                process.stdin.close()
 
     def ask(self, request: dict[str, Any], seconds: float) -> Iterator[Row]:
         """The answers to a request; the last one says `lost` if the process ended before.
@@ -131,7 +135,7 @@ class Worker:
         """How the process ended, in a word."""
         assert self._process is not None
         code = self._process.wait()
-        self._process = None
+        self.close()
         return "time-out" if -code in (signal.SIGXCPU, signal.SIGKILL) else f"crash ({code})"
 
     def failure(self) -> str:
@@ -169,8 +173,9 @@ class Worker:
 
 
 def _forward(stream: Any, lines: queue.Queue[str | None]) -> None:
-    for line in stream:
-        lines.put(line)
+    with stream:
+        for line in stream:
+            lines.put(line)
     lines.put(None)
 
 
@@ -207,7 +212,7 @@ def _git(*words: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(["git", *words], cwd=ROOT, capture_output=True, text=True, check=False)
 
 
-@contextmanager
+@contextlib.contextmanager
 def checkout_of(before: str) -> Iterator[Path]:
     """The checkout that is named by its path, or one of a commit in a temporary folder."""
     if (Path(before) / "src" / "hovi").is_dir():
