@@ -14,19 +14,14 @@ import hovi
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import DiscretePath, Grid
 from hovi.discrete.state import State
-from hovi.optimize.criteria import Criteria
-from hovi.optimize.interior_point import minimize_bounded
 from hovi.planning.problem.limits import Limits, as_limits
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.sequence.sequence_planner import plan_sequence
-from hovi.planning.solver.action_objective import ActionObjective
-from hovi.planning.solver.bounded_action import BoundedAction
-from hovi.planning.solver.limits.limit_rows import LEAST_GAP, MAX_LOSS, WEIGHT, LimitRows, push_rows
-from hovi.planning.solver.limits.row_forces import at_instants, forces_of
-from hovi.planning.solver.solver import guess_path, solve_on_grid
+from hovi.planning.solver.limits.limit_rows import LEAST_GAP, WEIGHT, LimitRows, push_rows
 from hovi.robot.loading import load_robot
 from hovi.scene.scene import Scene
 from hovi.schemes import by_name, galerkin
+from oracles.path_steps import moved, random_step
 from samples.manifold_robots import BASES, chain, configurations, with_arm
 
 Array = npt.NDArray[np.float64]
@@ -59,10 +54,7 @@ def problem_of(
 
 def wavy(problem: TrajectoryProblem, size: float = 0.03, seed: int = 5) -> DiscretePath:
     """The cubic guess with nodes and inner modes displaced at random."""
-    objective = ActionObjective(problem)
-    x = guess_path(problem, "cubic")
-    model = objective.model(x, None, None)
-    return objective.retract(x, size * model.random_vector(seed), model)
+    return moved(problem, problem.guess("cubic"), size * random_step(problem, seed))
 
 
 def rows_of(
@@ -142,12 +134,10 @@ def test_columns_of_rows_are_their_derivatives(base: str, grid: Grid) -> None:
     """Rows are linear in the columns: one difference is exact."""
     problem = problem_of(base, grid)
     rows, path = with_rows(problem), wavy(problem)
-    objective = ActionObjective(problem)
-    model = objective.model(path, None, None)
-    step = 1e-3 * model.random_vector(1)
-    moved = objective.retract(path, step, model)
-    found = push_rows(rows, rows.columns(objective.coordinates), model.gather(step))
-    expected = sampled_values(problem, rows, moved) - sampled_values(problem, rows, path)
+    step = 1e-3 * random_step(problem, 1)
+    after = moved(problem, path, step)
+    found = push_rows(rows, rows.columns("nodal"), step)
+    expected = sampled_values(problem, rows, after) - sampled_values(problem, rows, path)
     np.testing.assert_allclose(found, expected, rtol=1e-6, atol=1e-10)
 
 
@@ -387,7 +377,7 @@ def test_motions_of_order_3_have_rows_of_the_jerk(two_link: hovi.Robot) -> None:
     limits = as_limits(two_link, {"base": "none", "v": 1.0, "a": 3.0, "jerk": 20.0}, 3)
     ld = DiscreteLagrangian(hovi.spline(2, 3), grid)
     problem = TrajectoryProblem(ld, State([0.0, 0.1]), State([1.0, -0.5]), limits=limits)
-    path = guess_path(problem, "cubic")
+    path = problem.guess("cubic")
     random = np.random.default_rng(1)
     path = dataclasses.replace(path, inner=3.0 * random.normal(size=path.inner.shape))
     rows = LimitRows(grid, limits, None)
@@ -396,98 +386,6 @@ def test_motions_of_order_3_have_rows_of_the_jerk(two_link: hovi.Robot) -> None:
     np.testing.assert_allclose(value, found, rtol=1e-9, atol=1e-10)
     y, (lower, upper) = value, rows.bounds
     assert np.maximum(y - upper, lower - y).max() >= excess_by_sampling(problem, path).max() > 0
-
-
-# In the objective
-
-
-@each_grid
-@pytest.mark.parametrize("base", ["two_link", "continuous", "free-flyer"])
-def test_rows_are_outputs_after_those_at_the_points(base: str, grid: Grid) -> None:
-    """The model is that of the action with linear and square terms of all outputs."""
-    problem = problem_of(base, grid)
-    assert problem.limits is not None
-    rows = with_rows(problem)
-    limited = BoundedAction(problem, problem.limits, rows=rows)
-    x = wavy(problem)
-    y0 = limited.outputs(x).y
-    assert len(y0) == len(limited.bounds.lower) == len(limited.bounds.weights)
-    np.testing.assert_allclose(y0[-rows.size :], rows.values(x))
-    random = np.random.default_rng(0)
-    rho, sigma = random.standard_normal(y0.shape), random.uniform(0.0, 9.0, y0.shape)
-    rho[: -rows.size] = sigma[: -rows.size] = 0.0
-    zero = np.zeros_like(rho)
-    plain = limited.model(x, zero, zero, zero)
-    bare = plain.intervals.gradient.copy(), plain.intervals.hessian.copy()
-    model = limited.model(x, sigma, rho, zero)
-    step = model.random_vector(1)
-    local, dy = model.gather(step), limited.push(step, model)
-    w = limited.bounds.weights
-    gained = float(np.vdot(model.intervals.gradient - bare[0], local))
-    assert gained == pytest.approx(float((w * rho) @ dy), rel=1e-9)
-    square = np.einsum("kia,kijab,kjb->", local, model.intervals.hessian - bare[1], local)
-    assert float(square) == pytest.approx(float((w * sigma) @ dy**2), rel=1e-8)
-    pulled = float(np.vdot(limited.pull(rho, model), step))
-    assert pulled == pytest.approx(float((w * rho) @ dy), rel=1e-9)
-    h = 1e-4
-    up, down = (limited.outputs(limited.retract(x, c * h * step, model)).y for c in (1, -1))
-    scale = np.abs(dy).max()
-    np.testing.assert_allclose(dy, (up - down) / (2 * h), rtol=1e-5, atol=1e-6 * scale)
-
-
-@pytest.mark.parametrize("base", ["two_link", "continuous", "free-flyer"])
-def test_pulling_is_the_transpose_of_pushing(base: str) -> None:
-    """f . (w dy) = pull(f) . step for all outputs, on all spaces."""
-    limits = LIMITS | {"tau": 50.0}
-    problem = problem_of(base, GRIDS["mixed schemes"], limits)
-    assert problem.limits is not None
-    limited = BoundedAction(problem, problem.limits, rows=with_rows(problem))
-    x = wavy(problem)
-    y = limited.outputs(x).y
-    zero = np.zeros_like(y)
-    model = limited.model(x, zero, zero, zero)
-    for seed in range(3):
-        step, force = model.random_vector(seed), np.random.default_rng(seed).normal(size=y.shape)
-        work = float((limited.bounds.weights * force) @ limited.push(step, model))
-        assert float(limited.pull(force, model) @ step) == pytest.approx(work, rel=1e-9)
-
-
-@pytest.mark.parametrize("base", ["two_link", "continuous", "free-flyer"])
-def test_forces_of_rows_do_the_same_work_at_instants(base: str) -> None:
-    """sum w z dy of all rows is that of the forces on (q, v, a) at the instants."""
-    problem = problem_of(base, GRIDS["one scheme"])
-    rows, path = with_rows(problem), wavy(problem)
-    multipliers = np.random.default_rng(3).normal(size=rows.size)
-    instants, (terms,) = forces_of(problem, rows, multipliers)
-    assert instants is not None
-    objective = ActionObjective(problem)
-    model = objective.model(path, None, None)
-    moved = objective.retract(path, 1e-3 * model.random_vector(1), model)
-    work = float((rows.weights * multipliers) @ (rows.values(moved) - rows.values(path)))
-    k, s = instants.intervals, instants.positions
-    change = coordinates_of(problem, moved, k, s) - coordinates_of(problem, path, k, s)
-    forces = terms.jet_gradient.reshape(len(k), 3, -1)
-    work_of_forces = np.einsum("i,ijn,jin->", instants.weights, forces, change)
-    assert float(work_of_forces) == pytest.approx(work, rel=1e-7)
-    assert at_instants(problem, instants).ld.instants is instants
-    assert at_instants(problem, None) is problem
-
-
-def test_solutions_lose_no_more_than_what_they_promise(two_link: hovi.Robot) -> None:
-    """Against a solve with control points so near that the distance does not matter."""
-    grid = Grid.uniform(1.0, 8, galerkin(2))
-    ld = DiscreteLagrangian(Scene(two_link, []).effort_lagrangian(), grid)
-    limits = as_limits(two_link, {"base": "none", "v": [2.2, 2.8]})
-    problem = TrajectoryProblem(ld, State([0.0, 0.0]), State([1.5, -1.8]), limits=limits)
-    found = solve_on_grid(problem)
-    assert found.success
-    fine = LimitRows(grid, limits, None, None, (8, 8))
-    objective = BoundedAction(problem, limits, rows=fine)
-    start = guess_path(problem, found.trajectory)
-    exact = minimize_bounded(objective, start, Criteria(decrease=1e-10))
-    assert exact.feasible
-    assert 0 < found.cost / exact.outputs.value - 1 < 2 * MAX_LOSS
-    assert excess_by_sampling(problem, found.trajectory.path).max() <= 1e-8
 
 
 def test_stretched_rows_are_those_on_the_stretched_grid() -> None:

@@ -176,6 +176,18 @@ def test_momenta_change_at_a_frame_goal_by_forces_on_its_frame_alone(kind: str) 
     assert again.cost == pytest.approx(found.cost, rel=1e-10)
 
 
+def test_a_goal_that_is_stated_twice_changes_nothing() -> None:
+    """Its multipliers are not unique then, the motion is."""
+    goal = hovi.FrameGoal("tool0", position=place(HALFWAY))
+    once, twice = (
+        solve(reach(hovi.State(END), (hovi.Via(0.75, goal),) * count)) for count in (1, 2)
+    )
+    assert twice.usable, twice.message
+    assert twice.n_neg == 0
+    assert twice.cost == pytest.approx(once.cost, rel=1e-9)
+    np.testing.assert_allclose(twice.trajectory.q, once.trajectory.q, rtol=0, atol=1e-6)
+
+
 def rod(load: float, held: bool) -> hovi.TrajectoryProblem:
     """A rod under a load along it, straight: 1/2 q''^2 - load/2 q'^2 + q'^4; t is its length."""
     q, v, a = (ca.SX.sym(name, 1) for name in "qva")
