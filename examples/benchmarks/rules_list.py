@@ -349,13 +349,6 @@ _rule(
     "False",
 )
 _rule(
-    "forget the penalty",
-    "The penalty of |y - s| is set to zero where mu or the outputs change.",
-    "_Iteration._reduce_mu",
-    "0.0",
-    "self.penalty",
-)
-_rule(
     "mark again",
     "A later point takes the place of a marked one up to 1.5 times its product.",
     "_Iteration._mark",

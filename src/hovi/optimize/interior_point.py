@@ -304,7 +304,7 @@ class _Iteration(BoundedSteps[X]):
         outcome.barrier = Barrier.central(bounds, y, mu, outcome.barrier.scale, margin)
         self._drop_marks(mu)
         self.product = outcome.barrier.mean_product()
-        self.penalty, self.shift, self.radius = 0.0, 0.0, max(self.radius, 1.0)
+        self.shift, self.radius = 0.0, max(self.radius, 1.0)
         self.radius_to_restore = 0.0
         self.stalled, self.cautious = 0, self.plain
         self.violations.clear()
@@ -340,7 +340,6 @@ class _Iteration(BoundedSteps[X]):
         if solved:
             mu = max(last, min(0.1 * barrier.mu, self.density * share**1.5))
             outcome.barrier = barrier.with_mu(mu)
-            self.penalty = 0.0
 
     def _raise_mu(self, step: BoundedStep) -> None:
         """Raise mu if bounds have cut several steps in a row: steps along them would stay short."""
@@ -352,7 +351,7 @@ class _Iteration(BoundedSteps[X]):
             return
         bounds, y, scale = objective.bounds, outcome.outputs.y, outcome.barrier.scale
         outcome.barrier = Barrier.central(bounds, y, mu, scale, LEAST_RAISED_GAP)
-        self.cut, self.penalty = 0, 0.0
+        self.cut = 0
         self._drop_marks(mu)
 
     def _refined(self, at_end: bool) -> bool:
@@ -397,5 +396,5 @@ class _Iteration(BoundedSteps[X]):
         outcome.outputs, outcome.kept = outputs, kept
         self.product = barrier.mean_product()
         outcome.barrier = barrier.with_mu(max(barrier.mu, self.product))
-        self.penalty, self.radius = 0.0, max(self.radius, 1.0)
+        self.radius = max(self.radius, 1.0)
         return True
