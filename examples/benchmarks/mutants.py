@@ -3,6 +3,11 @@
     python examples/benchmarks/mutants.py --map        # which test runs which line (10 minutes)
     python examples/benchmarks/mutants.py              # 300 mutants by the seed, and the table
     python examples/benchmarks/mutants.py --again      # the survivors again, with other tests
+    python examples/benchmarks/mutants.py --solving --black-box    # what claims of motions notice
+
+With --solving faults are drawn from all code that solves, in optimize and planning. With
+--black-box only tests run whose files import nothing of the inside of the solver, so that they
+would stay as they are if it was written anew.
 
 Faults are drawn at random from all mutations of `mutations.py`. Each is put into a copy of the
 tree, in which the tests that run the changed statement run, the cheapest of every test file first,
@@ -59,6 +64,14 @@ PARTS = {
     "trajectories, files": ["discrete/*"],
 }
 """Parts of the table and their modules; a module belongs to the first part that names it."""
+SOLVING = {
+    part: patterns
+    for part, patterns in (PARTS | {"the rest of planning": ["planning/**/*"]}).items()
+    if patterns[0].startswith(("planning/", "optimize/"))
+}
+"""The same for all code that solves."""
+INSIDE = r"^\s*(?:from|import) hovi\.(?:optimize|planning\.(?:solver|refinement|search))\b"
+"""An import of the inside of the solver."""
 
 
 @dataclass(frozen=True)
@@ -71,11 +84,18 @@ class Mutant:
     mutation: Mutation
 
 
-def modules() -> dict[str, str]:
+def black_box_files() -> list[str]:
+    """The test files that import nothing of the inside of the solver."""
+    files = sorted((ROOT / "tests").rglob("test_*.py"))
+    outside = (f for f in files if not re.search(INSIDE, f.read_text(), re.MULTILINE))
+    return [str(file.relative_to(ROOT)) for file in outside]
+
+
+def modules(of: dict[str, list[str]]) -> dict[str, str]:
     """The part of every module, by its path below src/hovi."""
     parts: dict[str, str] = {}
     package = ROOT / "src/hovi"
-    for part, patterns in PARTS.items():
+    for part, patterns in of.items():
         for pattern in patterns:
             for file in sorted(package.glob(f"{pattern}.py")):
                 if file.name != "__init__.py" or pattern.startswith("schemes"):
@@ -83,9 +103,9 @@ def modules() -> dict[str, str]:
     return parts
 
 
-def drawn(seed: int, count: int) -> list[Mutant]:
-    """Random mutants of all modules, each mutation with the same probability."""
-    part = modules()
+def drawn(seed: int, count: int, of: dict[str, list[str]]) -> list[Mutant]:
+    """Random mutants of all modules of some parts, each mutation with the same probability."""
+    part = modules(of)
     sources = {path: (ROOT / "src/hovi" / path).read_text() for path in sorted(part)}
     everything = [
         (part[path], path, mutation)
@@ -144,14 +164,16 @@ class TestMap:
 
     __test__ = False
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, files: list[str] | None) -> None:
+        """files: the only ones whose tests count; None for all."""
         from coverage import CoverageData
 
+        self.files = files
         self.seconds: dict[str, float] = defaultdict(float)
         for log in folder.glob("*.log"):
             for line in log.read_text().splitlines():
                 took = re.match(r"\s*([\d.]+)s (?:call|setup)\s+(\S.*)", line)
-                if took:
+                if took and self._counts(took[2]):
                     self.seconds[took[2].strip()] += float(took[1])
         self.tests: dict[str, dict[int, set[str]]] = defaultdict(lambda: defaultdict(set))
         for file in folder.glob("*.data"):
@@ -161,6 +183,9 @@ class TestMap:
                 _, _, name = source.partition("/src/hovi/")
                 for line, contexts in data.contexts_by_lineno(source).items():
                     self.tests[name][line] |= {c.partition("|")[0] for c in contexts if c}
+
+    def _counts(self, test: str) -> bool:
+        return self.files is None or test.strip().partition("::")[0] in self.files
 
     def of(self, mutant: Mutant) -> list[str]:
         """The tests of a mutated statement, cheapest of every test file first."""
@@ -178,7 +203,9 @@ class TestMap:
         own = Path("tests") / Path(path).with_name(f"test_{Path(path).stem}.py")
         name = str(own if (ROOT / own).exists() else own.parent)
         mapped = any(test.startswith(name) for test in self.seconds)
-        return [] if mapped or not (ROOT / name).exists() else [name]
+        if mapped or not (ROOT / name).exists():
+            return []
+        return [name] if self.files is None else [f for f in self.files if f.startswith(name)]
 
     def users(self, name: str) -> set[str]:
         """The tests of all lines that contain a name."""
@@ -348,7 +375,7 @@ def table(results: list[dict[str, object]]) -> None:
         for part in (str(each["part"]), "all"):
             total[part] += 1
             noticed[part] += bool(each["by"])
-    names = [part for part in PARTS if total[part]] + ["all"]
+    names = [part for part in PARTS | SOLVING if total[part]] + ["all"]
     rows = [[p, total[p], noticed[p], f"{100 * noticed[p] / total[p]:.0f} %"] for p in names]
     print_table(["part", "mutants", "noticed", "share"], rows)
     for each in results:
@@ -362,6 +389,8 @@ def main() -> None:
     parser.add_argument("--map", action="store_true", help="record which test runs which line")
     parser.add_argument("--again", action="store_true", help="run the survivors again")
     parser.add_argument("--table", action="store_true", help="only print the results so far")
+    parser.add_argument("--solving", action="store_true", help="of all code that solves, alone")
+    parser.add_argument("--black-box", action="store_true", help="by tests from outside, alone")
     parser.add_argument("--no-types", action="store_true", help="leave out mypy")
     parser.add_argument("--seed", type=int, default=SEED)
     parser.add_argument("--count", type=int, default=COUNT)
@@ -371,17 +400,20 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=90.0, help="most time of its tests")
     chosen, more = parser.parse_known_args()
     chosen.work.mkdir(parents=True, exist_ok=True)
+    files = black_box_files() if chosen.black_box else None
     if chosen.map:
-        record_map(chosen.work, more)
+        record_map(chosen.work, [*more, *(files or [])])
         return
-    record = chosen.work / f"results-{chosen.seed}.jsonl"
+    words = [word for word in ("solving", "black_box") if getattr(chosen, word)]
+    record = chosen.work / f"{'-'.join(['results', *words, str(chosen.seed)])}.jsonl"
     lines = record.read_text().splitlines() if record.exists() else []
     results = {each["number"]: each for each in map(json.loads, lines)}
-    mutants = [m for m in drawn(chosen.seed, chosen.count) if re.search(chosen.only, m.path)]
+    everything = drawn(chosen.seed, chosen.count, SOLVING if chosen.solving else PARTS)
+    mutants = [m for m in everything if re.search(chosen.only, m.path)]
     if not chosen.table:
         os.environ["OPENBLAS_NUM_THREADS"] = "1"
         preload()
-        tests, types = TestMap(chosen.work), not chosen.no_types
+        tests, types = TestMap(chosen.work, files), not chosen.no_types
         tree = copied(chosen.work)
         runner = Runner(
             chosen.work, tree, tests, chosen.tests, chosen.seconds, chosen.slowdown, types
