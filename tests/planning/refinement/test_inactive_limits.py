@@ -1,73 +1,87 @@
-"""Which motions are refined without their limits: minima far from all of them, and no others."""
+"""Limits far from a motion cost nothing and change nothing; those that it touches do."""
 
 from __future__ import annotations
 
-import dataclasses
 from typing import Any
 
 import numpy as np
 import pytest
 
-from hovi import Solution, Status
-from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
-from hovi.discrete.grid import Grid
-from hovi.discrete.state import State
-from hovi.planning.clearance.clearance import Clearance
-from hovi.planning.clearance.obstacles import Sphere
-from hovi.planning.problem.limits import as_limits
-from hovi.planning.problem.problem import TrajectoryProblem
-from hovi.planning.refinement.inactive_limits import far_from_limits, without_limits
-from hovi.scene.scene import Scene
-from hovi.schemes import galerkin
-from oracles.on_grid import solve_on_grid
+import hovi
 from samples.paper_arm import HANG, REACH_Q
 
-FAR_AWAY = Sphere([0.0, 2.8, 0.0], 0.1)
+TOLERANCE = 1e-6
+FAR_AWAY = hovi.Sphere([0.0, 2.8, 0.0], 0.1)
 
 
-def reached(scene: Scene, limits: Any, **more: Any) -> Solution:
-    """The reach of the arm within limits."""
-    ld = DiscreteLagrangian(scene.effort_lagrangian(), Grid.uniform(1.0, 12, galerkin(2)))
-    bounds = None if limits is None else as_limits(scene.robot, {"base": "none", **limits})
-    return solve_on_grid(TrajectoryProblem(ld, State(HANG), State(REACH_Q), bounds, **more))
+def reached(scene: hovi.Scene, limits: Any, **more: Any) -> hovi.Solution:
+    """The reach of the arm within limits, to a tolerance that refines the grid."""
+    bounds = "none" if limits is None else {"base": "none", **limits}
+    found = hovi.plan(scene, HANG, REACH_Q, 1.0, limits=bounds, tolerance=TOLERANCE, **more)
+    assert found.success, found.message
+    return found
 
 
 @pytest.fixture(scope="module")
-def peak(arm_scene: Scene) -> float:
+def free(arm_scene: hovi.Scene) -> hovi.Solution:
+    return reached(arm_scene, None)
+
+
+@pytest.fixture(scope="module")
+def peak(free: hovi.Solution) -> float:
     """The largest speed of a joint without limits, in [rad/s]."""
-    motion = reached(arm_scene, None).trajectory
-    return float(np.abs(motion.sample(np.linspace(0.0, 1.0, 2001)).v).max())
+    return float(np.abs(free.trajectory.sample(np.linspace(0.0, 1.0, 2001)).v).max())
 
 
-def test_limits_that_are_far_away_are_inactive(arm_scene: Scene, peak: float) -> None:
-    far = reached(arm_scene, {"v": 1.5 * peak})
-    assert far_from_limits(far)
-    alone = without_limits(far)
-    assert alone.problem is not None
-    assert not alone.problem.limited
-
-
-def test_a_limit_that_the_motion_touches_is_active(arm_scene: Scene, peak: float) -> None:
-    near = reached(arm_scene, {"v": 0.9 * peak})
-    assert near.success
-    assert not far_from_limits(near)
-
-
-def test_a_motion_without_limits_has_none_to_leave_out(arm_scene: Scene) -> None:
-    assert not far_from_limits(reached(arm_scene, None))
-
-
-def test_a_motion_among_obstacles_keeps_its_limits(arm_scene: Scene, peak: float) -> None:
-    """However far away the obstacles are."""
-    clearance = Clearance([FAR_AWAY], 0.05)
-    found = reached(arm_scene, {"v": 1.5 * peak}, clearance=clearance)
-    assert found.success
-    assert not far_from_limits(found)
-
-
-@pytest.mark.parametrize("status", [s for s in Status if s is not Status.MINIMUM])
-def test_a_motion_that_is_no_minimum_keeps_its_limits(
-    arm_scene: Scene, peak: float, status: Status
+@pytest.mark.parametrize("share", [1.1, 1.5, 5.0])
+def test_limits_that_are_far_away_change_nothing(
+    arm_scene: hovi.Scene, free: hovi.Solution, peak: float, share: float
 ) -> None:
-    found = reached(arm_scene, {"v": 1.5 * peak})
-    assert not far_from_limits(dataclasses.replace(found, success=False, status=status))
+    """Nor do they keep a tolerance from being reached that limits would not allow."""
+    far = reached(arm_scene, {"v": share * peak})
+    assert far.accuracy is not None
+    assert far.accuracy.reached
+    assert far.cost == pytest.approx(free.cost, rel=2 * TOLERANCE)
+    assert far.problem is not None
+    assert far.problem.limited
+
+
+def test_a_limit_that_the_motion_touches_is_kept(
+    arm_scene: hovi.Scene, free: hovi.Solution, peak: float
+) -> None:
+    near = reached(arm_scene, {"v": 0.9 * peak})
+    assert near.cost > free.cost * (1 + 1e-4)
+    v = near.trajectory.sample(np.linspace(0.0, 1.0, 5_001)).v
+    assert np.abs(v).max() <= 0.9 * peak * (1 + 2e-6)
+    assert near.accuracy is not None
+    assert not near.accuracy.reached
+    assert "the tolerance of limits allows no smaller error" in near.message
+
+
+def test_a_motion_among_obstacles_keeps_its_limits(
+    arm_scene: hovi.Scene, free: hovi.Solution, peak: float
+) -> None:
+    """However far away the obstacles are."""
+    found = reached(arm_scene, {"v": 0.9 * peak}, obstacles=[FAR_AWAY], margin=0.05)
+    v = found.trajectory.sample(np.linspace(0.0, 1.0, 5_001)).v
+    assert np.abs(v).max() <= 0.9 * peak * (1 + 2e-6)
+    alone = reached(arm_scene, {"v": 1.5 * peak}, obstacles=[FAR_AWAY], margin=0.05)
+    assert alone.cost == pytest.approx(free.cost, rel=1e-6)
+
+
+@pytest.mark.parametrize("most", [1, 3, 6])
+def test_a_motion_that_is_no_minimum_keeps_its_limits(
+    arm_scene: hovi.Scene, peak: float, most: int
+) -> None:
+    found = hovi.plan(
+        *(arm_scene, HANG, REACH_Q, 1.0),
+        **{"limits": {"base": "none", "v": 1.05 * peak}, "tolerance": TOLERANCE},
+        **{"max_iterations": most, "continuation": False},
+    )
+    if found.usable:
+        v = found.trajectory.sample(np.linspace(0.0, 1.0, 5_001)).v
+        assert np.abs(v).max() <= 1.05 * peak * (1 + 2e-6)
+    else:
+        assert not found.success
+    assert found.problem is not None
+    assert found.problem.limited

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
-from functools import partial
+from time import monotonic
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -17,17 +18,17 @@ from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import Grid
 from hovi.errors import HoviWarning
 from hovi.planning.problem.limits import as_limits
-from hovi.planning.refinement import resolution
-from hovi.planning.refinement.error_estimate import finer_than
-from hovi.planning.refinement.faults.on_curve import RESOLVED
-from hovi.planning.refinement.resolution import FARTHER, GROWTH, NEARBY, resolved
 from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
 from hovi.schemes import by_name
-from hovi.system.deadline import Deadline
+from hovi.system import deadline
 from oracles.on_grid import solve_on_grid
 from samples.paper_arm import HANG, REACH_Q
 
+RESOLVED = 0.01
+"""Relative error of the cost above which a motion is no minimum."""
+NEARBY, FARTHER, GROWTH = 0.05, 0.5, 2.0
+"""Changes of q and T v up to which an estimate is kept, and up to which it grows by a factor."""
 FAST: dict[str, Any] = {"limits": "none", "processes": 1}
 PANDA_START = [0.0, -0.5, 0.0, -2.0, 0.0, 1.6, 0.7]
 PANDA_GOAL = [0.9, 0.3, -0.4, -1.2, 0.5, 2.2, -0.3]
@@ -158,12 +159,21 @@ def test_replanning_near_a_resolved_motion_keeps_its_estimate(arm_scene: Scene) 
     far = first.replan(goal=[0.9, 0.2])
     assert near.success
     assert near.error_estimate == first.error_estimate
-    anew = resolved(dataclasses.replace(near, error_estimate=None))
-    assert anew.error_estimate == pytest.approx(near.error_estimate, rel=0.5)
+    assert anew(near) == pytest.approx(near.error_estimate, rel=0.5)
     assert far.success
     assert far.error_estimate != first.error_estimate
     true = solve_on_grid(far.problem.finer.finer, far.trajectory)  # type: ignore[union-attr]
     assert far.error_estimate == pytest.approx(abs(far.cost / true.cost - 1), rel=0.1)
+
+
+def anew(solution: Solution) -> float:
+    """The error estimate of the same motion by a comparison of its own."""
+    assert solution.problem is not None
+    found = hovi.solve(solution.problem, solution.trajectory)
+    assert found.success, found.message
+    assert found.cost == pytest.approx(solution.cost, rel=1e-5)
+    assert found.error_estimate is not None
+    return found.error_estimate
 
 
 FREE_END = [1.2, 0.8]
@@ -179,71 +189,46 @@ def free_reach(two_link: Robot) -> Solution:
 
 @pytest.mark.parametrize(("far", "kept"), [(0.6, True), (1.6, False)])
 def test_the_estimate_of_a_motion_without_limits_is_kept_with_a_margin_farther_away(
-    two_link: Robot, monkeypatch: pytest.MonkeyPatch, far: float, kept: bool
+    two_link: Robot, far: float, kept: bool
 ) -> None:
     """far: the change of q, and of T v, relative to FARTHER."""
     first, end = free_reach(two_link), np.array(FREE_END)
-    calls = comparisons(monkeypatch)
     change = first.replan(goal=end + 0.01).trajectory.v - first.trajectory.v
     moved = first.replan(goal=end + 0.01 * far * FARTHER / np.abs(change).max())
     assert moved.success, moved.message
-    assert bool(calls) != kept
-    anew = resolved(dataclasses.replace(moved, error_estimate=None))
     assert first.error_estimate is not None
-    assert anew.error_estimate is not None
-    assert moved.error_estimate == (GROWTH * first.error_estimate if kept else anew.error_estimate)
-    assert anew.error_estimate <= moved.error_estimate
+    assert moved.error_estimate is not None
+    assert (moved.error_estimate == GROWTH * first.error_estimate) == kept
+    assert anew(moved) <= moved.error_estimate * (1 + 1e-6)
 
 
-def test_no_estimate_is_kept_farther_away_where_a_joint_whirls(
-    two_link: Robot, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    first = free_reach(two_link)
-    calls = comparisons(monkeypatch)
-    assert first.replan(goal=[1.22, 0.82]).success
-    assert not calls
-    again = free_reach(two_link)
-    calls.clear()
-    monkeypatch.setattr(resolution, "whirl", lambda motion: "a whirl")
-    assert again.replan(goal=[1.22, 0.82]).success
-    assert calls
-
-
-def test_an_estimate_without_limits_is_not_kept_above_the_largest_difference(
-    two_link: Robot, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """It has no safety factor, so that twice more than half of one per cent is too large."""
-    first = free_reach(two_link)
-    for share, kept in ((0.4, True), (0.6, False)):
-        check = dataclasses.replace(first.check, estimate=share * RESOLVED)  # type: ignore[type-var]
-        calls = comparisons(monkeypatch)
-        assert dataclasses.replace(first, check=check).replan(goal=[1.22, 0.82]).success
-        assert bool(calls) != kept
-
-
-def test_within_limits_a_motion_is_compared_with_the_followed_finer_one(
-    two_link: Robot, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Its estimate is that of a new comparison, at less cost."""
+@pytest.mark.parametrize("N", range(20, 60, 4))
+def test_no_estimate_that_is_kept_is_too_large_for_a_success(two_link: Robot, N: int) -> None:
+    """Twice more than half of one per cent is too large: such a motion is compared again."""
     scene = Scene(two_link, [hovi.effects.Gravity()])
-    ld = DiscreteLagrangian(scene.effort_lagrangian(), Grid.uniform(1.0, 24, by_name("galerkin-2")))
-    limits = as_limits(two_link, {"base": "none", "v": 1.6, "tau": 60.0})
-    ends = hovi.State([0.0, 0.0]), hovi.State([1.2, 0.8])
-    first = hovi.solve(hovi.TrajectoryProblem(ld, *ends, limits))
-    assert first.success, first.message
-    calls = []
-    known = resolution.finer_than
-    monkeypatch.setattr(resolution, "finer_than", lambda x: calls.append(1) or known(x))
-    monkeypatch.setattr(resolution, "NEARBY", 1e-3)
-    monkeypatch.setattr(resolution, "FARTHER", 1e-3)
-    moved = first.replan(goal=[1.204, 0.797])
-    again = moved.replan(goal=[1.2, 0.8])
-    assert moved.success, moved.message
-    assert again.success, again.message
-    assert not calls
-    anew = resolved(dataclasses.replace(moved, error_estimate=None))
-    assert calls
-    assert moved.error_estimate == pytest.approx(anew.error_estimate, rel=0.3, abs=3e-5)
+    grid = Grid.uniform(1.0, N, by_name("taylor-midpoint"))
+    ld = DiscreteLagrangian(scene.effort_lagrangian(), grid)
+    first = hovi.solve(hovi.TrajectoryProblem(ld, hovi.State([0.0, 0.0]), hovi.State(FREE_END)))
+    assert first.error_estimate is not None
+    moved = first.replan(goal=[1.22, 0.82])
+    if first.success:
+        assert moved.success, moved.message
+        doubled = moved.error_estimate == GROWTH * first.error_estimate
+        assert doubled == (GROWTH * first.error_estimate <= RESOLVED)
+    else:
+        assert first.error_estimate > RESOLVED
+
+
+def test_within_limits_estimates_of_a_chain_of_motions_are_those_of_new_comparisons(
+    two_link: Robot,
+) -> None:
+    motion = fast_reach(two_link, {"v": 1.6, "tau": 60.0}, [1.2, 0.8])
+    for goal in ([1.26, 0.76], [1.2, 0.8], [1.1, 0.85]):
+        motion = motion.replan(goal=goal)
+        assert motion.success, motion.message
+        assert motion.error_estimate is not None
+        assert anew(motion) <= 1.2 * motion.error_estimate + 3e-5
+        assert motion.error_estimate <= 5.0 * anew(motion) + 3e-4
 
 
 def fast_reach(two_link: Robot, limits: dict[str, Any], goal: list[float]) -> Solution:
@@ -257,50 +242,30 @@ def fast_reach(two_link: Robot, limits: dict[str, Any], goal: list[float]) -> So
     return found
 
 
-def comparisons(monkeypatch: pytest.MonkeyPatch) -> list[int]:
-    """One entry for every comparison with a finer solution from now on."""
-    calls: list[int] = []
-    for name in ("finer_than", "followed_within_limits"):
-        known = getattr(resolution, name)
-        counted = partial(lambda known, *given: calls.append(1) or known(*given), known)
-        monkeypatch.setattr(resolution, name, counted)
-    return calls
-
-
-def test_an_estimate_is_kept_with_a_margin_while_the_same_limits_hold(
-    two_link: Robot, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_estimate_is_kept_with_a_margin_while_the_same_limits_hold(two_link: Robot) -> None:
     first = fast_reach(two_link, {"v": 1.6, "tau": 60.0}, [1.2, 0.8])
-    assert first.error_estimate is not None
-    calls = comparisons(monkeypatch)
     moved = first.replan(goal=[1.21, 0.8])
     assert moved.success, moved.message
-    assert not calls
+    assert first.error_estimate is not None
     assert moved.error_estimate is not None
     assert moved.error_estimate > 2.0 * first.error_estimate
-    anew = resolved(dataclasses.replace(moved, error_estimate=None))
-    assert anew.error_estimate is not None
-    assert anew.error_estimate <= moved.error_estimate
+    assert anew(moved) <= moved.error_estimate
 
 
-@pytest.mark.parametrize(("goal", "kept"), [(1.21, True), (1.23, False)])
+@pytest.mark.parametrize("goal", [1.21, 1.23])
 def test_near_a_limit_that_begins_to_hold_no_estimate_is_too_small(
-    two_link: Robot, monkeypatch: pytest.MonkeyPatch, goal: float, kept: bool
+    two_link: Robot, goal: float
 ) -> None:
     """Its error is some ten times that of the motion before, and more from there on."""
     free = fast_reach(two_link, {"v": 10.0}, [1.2, 0.8])
     fastest = float(np.abs(free.trajectory.sample(np.linspace(0.0, 1.0, 1000)).v).max())
     first = fast_reach(two_link, {"v": 1.001 * fastest}, [1.2, 0.8])
-    calls = comparisons(monkeypatch)
     moved = first.replan(goal=[goal, 0.8])
     assert moved.success, moved.message
-    assert bool(calls) != kept
-    anew = resolved(dataclasses.replace(moved, error_estimate=None))
     assert first.error_estimate is not None
-    assert anew.error_estimate is not None
     assert moved.error_estimate is not None
-    assert anew.error_estimate > 5.0 * first.error_estimate
-    assert anew.error_estimate <= 1.2 * moved.error_estimate
+    assert anew(moved) > 5.0 * first.error_estimate
+    assert anew(moved) <= 1.2 * moved.error_estimate
 
 
 def test_no_estimate_is_kept_from_a_motion_at_rest(two_link: Robot) -> None:
@@ -361,24 +326,22 @@ LATE = "the time limit was reached before it was compared with one on a finer gr
 
 @pytest.mark.parametrize("limits", ["none", "urdf"])
 def test_a_minimum_that_no_time_is_left_to_check_is_not_called_one(
-    arm_scene: Scene, limits: str
+    arm_scene: Scene, limits: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    problem = hovi.TrajectoryProblem(
-        hovi.DiscreteLagrangian(
-            arm_scene.effort_lagrangian(), Grid.uniform(1.0, 16, by_name("galerkin-2"))
-        ),
-        hovi.State(HANG),
-        hovi.State(REACH_Q),
-        limits=as_limits(arm_scene.robot, limits),
-    )
-    found = solve_on_grid(problem)
-    assert found.success
-    with Deadline(-1.0).in_force():
-        late = resolved(found)
+    """By a clock that leaps when the plan says that it compares."""
+    leap = 0.0
+
+    def progress(text: str, share: float) -> None:
+        nonlocal leap
+        leap = 1e6 if "comparing" in text else leap
+
+    monkeypatch.setattr(deadline, "time", SimpleNamespace(monotonic=lambda: monotonic() + leap))
+    given = {"limits": limits, "intervals": 16, "scheme": "galerkin-2"}
+    late = hovi.plan(arm_scene, HANG, REACH_Q, 1.0, time_limit=1e5, progress=progress, **given)
     assert (late.success, late.status, late.minima) == (False, Status.TIME_LIMIT, ())
     assert LATE in late.message
     assert late.trajectory.metadata["status"] == "time_limit"
-    assert resolved(found).success
+    assert hovi.plan(arm_scene, HANG, REACH_Q, 1.0, **given).success
 
 
 @pytest.mark.parametrize("scheme", ["galerkin-2", "galerkin-2x8", "taylor-midpoint"])
@@ -399,9 +362,9 @@ def test_the_change_that_is_told_is_that_on_the_finer_grid(arm_scene: Scene) -> 
         found = hovi.plan(arm_scene, *ends, scheme="hermite-simpson", intervals=N, **FAST)
         if "a finer grid changes its cost by" not in found.message:
             continue
-        finer = finer_than(dataclasses.replace(found, success=True))
-        assert finer is not None
-        told = 100 * abs(finer.known - finer.cost) / found.cost
+        assert found.problem is not None
+        finer = solve_on_grid(found.problem.finer, found.trajectory)
+        told = 100 * abs(finer.cost / found.cost - 1)
         assert f"a finer grid changes its cost by {told:.2g} %" in found.message
         times += 1
     assert times >= 2
