@@ -19,6 +19,7 @@ import pinocchio as pin
 import hovi
 from hovi.optimize.criteria import Criteria
 from hovi.optimize.interior_point import minimize_bounded
+from hovi.optimize.start import Start
 from hovi.planning.solver.bounded_action import BoundedAction
 from hovi.planning.solver.solver import guess_path
 from hovi.robot.example_robots import example_robot
@@ -136,9 +137,11 @@ def cold_point_solve(problem: hovi.TrajectoryProblem) -> PointSolve:
     limits = problem.limits
     assert limits is not None
     path, criteria = guess_path(problem, "cubic"), Criteria(decrease=1e-9, max_iterations=500)
-    seconds, found = timed(lambda: minimize_bounded(BoundedAction(problem, limits), path, criteria))
+    seconds, found = timed(
+        lambda: minimize_bounded(BoundedAction(problem, limits), Start(path), criteria)
+    )
     good = found.feasible and found.why == "stationary"
-    return PointSolve(found.iterations, float(found.outputs.value), seconds, good)
+    return PointSolve(len(found.steps), float(found.outputs.value), seconds, good)
 
 
 def timed(work: Callable[[], Result]) -> tuple[float, Result]:

@@ -192,10 +192,10 @@ class Barrier:
         zl, zu = (np.where(known, z[chosen], 0.0) for z in (self.zl, self.zu))
         return dataclasses.replace(self, bounds=some, s=self.s[chosen], zl=zl, zu=zu)
 
-    def at_outputs(self, y: Array) -> Barrier:
-        """The same with slacks at outputs that are within the bounds to rounding."""
-        bounds, least = self.bounds, LEAST_GAP
-        return dataclasses.replace(self, s=np.clip(y, bounds.lower + least, bounds.upper - least))
+    def at_outputs(self, bounds: Bounds, y: Array) -> Barrier:
+        """The same with slacks at outputs that are within other bounds to rounding."""
+        s = np.clip(y, bounds.lower + LEAST_GAP, bounds.upper - LEAST_GAP)
+        return dataclasses.replace(self, bounds=bounds, s=s)
 
     def outside(self, y: Array) -> Array:
         """How far outputs are outside their bounds, 0 inside, shape (R,)."""

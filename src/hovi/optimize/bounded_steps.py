@@ -12,8 +12,9 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.optimize.barrier import Barrier, Direction, Pair
-from hovi.optimize.bounded_objective import BoundedObjective, BoundedOutcome
+from hovi.optimize.bounded_objective import BoundedObjective
 from hovi.optimize.criteria import Criteria
+from hovi.optimize.ended import Ended
 from hovi.optimize.quadratic_model import QuadraticModel, next_radius
 from hovi.optimize.trust_region import Trial, solve_subproblem
 from hovi.system.dataclass import dataclass
@@ -79,22 +80,23 @@ class BoundedStep:
 class BoundedSteps(Generic[X]):
     """The steps of an interior point: plain ones of one mu, and corrected ones that lower it.
 
-    objective: with its bounds. outcome: the current point and its barrier. criteria: see Criteria.
+    objective: with its bounds. ended: the current point and its barrier.
+    criteria: see Criteria.
     density: mean density of the objective, its scale.
     """
 
     def __init__(
         self,
         objective: BoundedObjective[X],
-        outcome: BoundedOutcome[X],
+        ended: Ended[X, Barrier],
         criteria: Criteria,
         density: float,
     ) -> None:
         self.objective = objective
-        self.outcome = outcome
+        self.ended = ended
         self.criteria = criteria
         self.density = density
-        self.product = outcome.barrier.mean_product()
+        self.product = ended.z.mean_product()
         self.radius = criteria.radius
         self.shift = 0.0
         self.penalty = 0.0
@@ -107,34 +109,34 @@ class BoundedSteps(Generic[X]):
         Where it is not convex, the objective may replace it by one that is not `exact`: see
         BoundedObjective.model_without_concavity.
         """
-        outcome = self.outcome
-        sigma, rho, force = outcome.barrier.condensed(outcome.outputs.y)
+        ended = self.ended
+        sigma, rho, force = ended.z.condensed(ended.outputs.y)
         self.sigma, self.rho, self.exact = sigma, rho, True
-        model = self.objective.model(outcome.x, sigma, rho, force)
+        model = self.objective.model(ended.x, sigma, rho, force)
         known = self.exact_from_now_on or not self.objective.may_be_concave
         if known or model.factor(0.0) is not None:
             return model
-        other = self.objective.model_without_concavity(outcome.x)
+        other = self.objective.model_without_concavity(ended.x)
         self.exact = other is None
         return model if other is None else other
 
     def step(self, model: QuadraticModel) -> BoundedStep:
         """A corrected step towards a smaller mu if the model is convex, else a plain one."""
         trial = solve_subproblem(model, self.radius, self.shift)
-        ahead = self.product > 2.0 * self.final_mu or self.outcome.barrier.mu > 1.01 * self.final_mu
+        ahead = self.product > 2.0 * self.final_mu or self.ended.z.mu > 1.01 * self.final_mu
         if trial.newton and not self.cautious and ahead:
             step = self._corrected(trial, model)
             short = step.share * step.trial.norm <= MAX_STRETCH * self.radius
             if short and step.decrease > -10 * self.noise:
-                self.outcome.corrected = True
+                self.ended.corrected = True
                 return step
         self.cautious = True
-        barrier = self.outcome.barrier
+        barrier = self.ended.z
         return self._shortened(trial, trial.step, None, barrier.central_targets(), model)
 
     def _corrected(self, trial: Trial, model: QuadraticModel) -> BoundedStep:
         """A predictor, its second-order correction, and corrections of outliers."""
-        barrier, y, product = self.outcome.barrier, self.outcome.outputs.y, self.product
+        barrier, y, product = self.ended.z, self.ended.outputs.y, self.product
         zero = np.zeros_like(y)
         affine, _, _ = self._direction(trial, (zero, zero), model)
         after = barrier.mean_product(affine)
@@ -157,7 +159,7 @@ class BoundedSteps(Generic[X]):
         self, trial: Trial, targets: Pair, model: QuadraticModel
     ) -> tuple[Direction, Array, Array]:
         """The direction for given targets, its step, and the change of the gradient."""
-        barrier, y = self.outcome.barrier, self.outcome.outputs.y
+        barrier, y = self.ended.z, self.ended.outputs.y
         assert trial.factor is not None
         pulled = self.objective.pull(barrier.shift(barrier.mu, targets), model)
         s = trial.step - trial.factor.solve(pulled)
@@ -178,8 +180,8 @@ class BoundedSteps(Generic[X]):
         s: the step, for the model's gradient plus `pulled`. barrier: with the mu that it aims at.
         along: its direction, if it is known.
         """
-        barrier = barrier or self.outcome.barrier
-        y, weights = self.outcome.outputs.y, self.objective.bounds.weights
+        barrier = barrier or self.ended.z
+        y, weights = self.ended.outputs.y, self.objective.bounds.weights
         along = along or barrier.aim(y, self.objective.push(s, model), targets)
         self.penalty = 1.2 * along.largest_force  # of this step alone
         slope = float(np.vdot(model.gradient, s)) - float(np.vdot(weights * self.rho, along.dy))
@@ -220,7 +222,7 @@ class BoundedSteps(Generic[X]):
             return max(radius, MOST_GROWTH * last)
         if step.trial.newton or step.share >= SHORT_SHARE:
             return radius
-        if self.outcome.violation <= MATCHED:
+        if self.ended.violation <= MATCHED:
             return min(radius, max(CUT_RADIUS * length, LEAST_CUT_RADIUS))
         if not reopens:
             return radius
@@ -229,7 +231,7 @@ class BoundedSteps(Generic[X]):
 
     def scale(self) -> float:
         """Magnitude of the objective, to which decreases are relative; positive."""
-        return max(abs(self.outcome.outputs.value), 1e-10 * self.density * self._measure)
+        return max(abs(self.ended.outputs.value), 1e-10 * self.density * self._measure)
 
     @property
     def final_mu(self) -> float:

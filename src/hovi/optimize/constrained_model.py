@@ -19,6 +19,7 @@ import numpy.typing as npt
 
 from hovi._native import band as native
 from hovi.optimize.banded_model import BandFactor, BandLayout, BandModel
+from hovi.optimize.ended import Outputs
 from hovi.optimize.quadratic_model import Factor, IntervalSum
 from hovi.system.dataclass import dataclass
 
@@ -220,8 +221,11 @@ def size_of(c: Array) -> float:
 class EqualityObjective(ABC, Generic[X]):
     """An objective f under equations c = 0, on a manifold."""
 
+    penalty: float = 1.0
+    """First weight of A^T A, which is to exceed the negative curvature across c = 0."""
+
     @abstractmethod
-    def evaluate(self, x: X) -> tuple[float, Array]:
+    def evaluate(self, x: X) -> Outputs:
         """f and c at x; not finite where they are not defined."""
 
     @abstractmethod

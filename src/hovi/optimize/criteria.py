@@ -4,6 +4,10 @@ from __future__ import annotations
 
 from hovi.system.dataclass import dataclass
 
+ROOM = 2e-7
+"""Distance by which bounds are moved inwards while a nearby solution is followed, and by which
+outputs may miss them at the end, relative to the range."""
+
 
 @dataclass(frozen=True)
 class Criteria:
@@ -17,10 +21,14 @@ class Criteria:
     escape_saddles: leave a saddle along negative curvature; False stops there.
     exact: stop only where rounding alone remains, after a Newton step of an exact model.
     near: whether the first iterate is near a solution, so that a barrier begins small.
+    plain: with bounds, take plain steps alone, each barrier parameter until its problem is solved:
+        slower, and more robust.
+    outside: how far outputs may be outside their bounds at the end of `follow_bounded`, relative to
+        the range.
     barrier: its last parameter, relative to the mean density of the objective.
     enough: with bounds, stop within them where a whole Newton step predicts a smaller decrease,
         relative to the value, even if it would be cut short.
-    stalled: without bounds, stop where STALLED_STEPS steps decrease the value by a smaller share.
+    stalled: without bounds, stop where some steps decrease the value by a smaller fraction.
     """
 
     decrease: float = 1e-11
@@ -34,3 +42,5 @@ class Criteria:
     barrier: float = 1e-10
     enough: float = 0.0
     stalled: float = 0.0
+    plain: bool = False
+    outside: float = ROOM

@@ -34,16 +34,12 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.optimize.barrier import Barrier
-from hovi.optimize.bounded_objective import (
-    FEASIBILITY_TOLERANCE,
-    BoundedObjective,
-    BoundedOutcome,
-    Refinement,
-)
+from hovi.optimize.bounded_objective import BoundedObjective, Refinement
 from hovi.optimize.bounded_steps import MATCHED, SHORT_SHARE, BoundedStep, BoundedSteps
 from hovi.optimize.criteria import Criteria
-from hovi.optimize.ended import Iteration, Reason
+from hovi.optimize.ended import FEASIBILITY_TOLERANCE, Ended, Iteration, Reason
 from hovi.optimize.quadratic_model import QuadraticModel, decrease_ratio, next_shift
+from hovi.optimize.start import Start
 from hovi.system.deadline import raise_if_late
 from hovi.system.interruption import raise_if_interrupted
 
@@ -72,8 +68,8 @@ that an inexact model led to, and the least distance of slacks from their bounds
 the range, per barrier parameter."""
 REOPENED_LEVEL = 0.3
 """The least such parameter, relative to the mean product of multipliers and gaps."""
-MARKED_AGAIN = 1.5
-"""Product up to which a later point takes the place of a marked one, relative to its first."""
+SAVED_AGAIN = 1.5
+"""A saved iterate is replaced while the mean product is below this many times its first one."""
 MAX_REFINEMENTS = 40
 """Maximum number of refinements."""
 CUT_SHARE, MOST_CUT, RAISED = 0.5, 4, 10.0
@@ -108,32 +104,25 @@ SLOW_DECREASE, LARGE_VIOLATION = 0.1, 1e-3
 
 def minimize_bounded(
     objective: BoundedObjective[X],
-    x: X,
+    start: Start[X, Barrier],
     criteria: Criteria,
     report: Callable[[int, float], None] | None = None,
-    start: Barrier | None = None,
-    plain: bool = False,
-) -> BoundedOutcome[X]:
-    """Minimise from x, which may violate the bounds; Ctrl-C ends it with the current point.
+) -> Ended[X, Barrier]:
+    """Minimise from a point that may violate the bounds; Ctrl-C ends it with the current point.
 
-    start: slacks and multipliers of a nearby solution, for a warm start.
-    plain: take plain steps alone, each mu until its problem is solved: slower, and more robust.
+    start.z: slacks and multipliers of a nearby solution, for a warm start.
     """
-    outputs = objective.outputs(x)
+    outputs = objective.outputs(start.x)
     density = abs(outputs.value) / objective.bounds.measure
     if density < DENSITY_FLOOR:
         density = 1.0
-    barrier = start or Barrier.central(objective.bounds, outputs.y, INITIAL_MU * density)
-    cold, warm = objective.radii
-    criteria = dataclasses.replace(criteria, radius=cold if start is None else warm)
-    outcome = BoundedOutcome(x, outputs, barrier, Reason.ITERATION_LIMIT)
-    if not np.isfinite(outputs.value):
-        outcome.why = Reason.DIVERGED
-        return outcome
-    outcome.keep_best(objective.bounds)
-    with outcome.recorded_end(criteria.time_limit):
-        _Iteration(objective, outcome, criteria, density, report, plain).run()
-    return outcome
+    barrier = start.z or Barrier.central(objective.bounds, outputs.y, INITIAL_MU * density)
+    ended = Ended(start.x, outputs, barrier)
+    with ended.recorded_end(criteria.time_limit):
+        cold, warm = objective.radii
+        criteria = dataclasses.replace(criteria, radius=cold if start.z is None else warm)
+        _Iteration(objective, ended, criteria, density, report).run()
+    return ended
 
 
 class _Iteration(BoundedSteps[X]):
@@ -142,29 +131,31 @@ class _Iteration(BoundedSteps[X]):
     def __init__(
         self,
         objective: BoundedObjective[X],
-        outcome: BoundedOutcome[X],
+        ended: Ended[X, Barrier],
         criteria: Criteria,
         density: float,
         report: Callable[[int, float], None] | None,
-        plain: bool,
     ) -> None:
-        super().__init__(objective, outcome, criteria, density)
-        self.plain = self.cautious = plain
+        super().__init__(objective, ended, criteria, density)
+        self.plain = self.cautious = criteria.plain
         self.report = report
         self.stalled = self.unmet = 0
         self.violations: list[float] = []
         self.level = FIRST_REFINEMENT
         self.refinements = self.reopenings = self.saddles = 0
         self.saddle: X | None = None
-        self.marks, self.marked = outcome.marks, 0.0
+        self.first_product = 0.0
         self.cut, self.radius_to_restore = 0, 0.0
 
     def run(self) -> None:
         """Iterate until stationary, or until a limit is reached."""
+        if not np.isfinite(self.ended.value):
+            raise ArithmeticError("the objective is not defined at the first point")
+        self.ended.keep_best(self.objective.bounds)
         raise_if_interrupted()
         raise_if_late()
         model = self.model()
-        while self.outcome.iterations < self.criteria.max_iterations:
+        while len(self.ended.steps) < self.criteria.max_iterations:
             raise_if_interrupted()
             raise_if_late()
             step = self.step(model)
@@ -185,23 +176,23 @@ class _Iteration(BoundedSteps[X]):
                     model = self.model()
                 continue
             if self._is_hopeless():
-                if self.outcome.x is self.saddle:
+                if self.ended.x is self.saddle:
                     return self._end(model)
                 if not self._reopened():
-                    self.outcome.why = Reason.DIVERGED
+                    self.ended.why = Reason.DIVERGED
                     return
                 refined = True
             if accepted or refined:
                 model = self.model()
-        if self.outcome.x is self.saddle:
+        if self.ended.x is self.saddle:
             self._end(model)
 
     def _try(self, step: BoundedStep, model: QuadraticModel) -> bool:
-        outcome, trial, along = self.outcome, step.trial, step.along
+        ended, trial, along = self.ended, step.trial, step.along
         barrier = step.barrier
         moved_step = step.share * trial.step
-        x = self.objective.retract(outcome.x, moved_step, model)
-        before = outcome.outputs.value + self._hold(step.reaction, 1.0)
+        x = self.objective.retract(ended.x, moved_step, model)
+        before = ended.outputs.value + self._hold(step.reaction, 1.0)
         try:
             outputs = self.objective.outputs(x)
         except BaseException:  # the multipliers stay those of the current point
@@ -213,18 +204,15 @@ class _Iteration(BoundedSteps[X]):
             moved = barrier.moved(outputs.y, along, step.share, self.penalty)
             new = outputs.value + moved.merit(outputs.y, self.penalty, along, 0.0)
         ratio = decrease_ratio(old - new, step.decrease, self.noise)
-        outcome.iterations += 1
-        outcome.history.append(
-            Iteration(outputs.value, step.decrease, ratio, trial.shift, self.radius)
-        )
+        ended.steps.append(Iteration(outputs.value, step.decrease, ratio, trial.shift, self.radius))
         if self.report is not None:
-            self.report(outcome.iterations, outputs.value)
+            self.report(len(ended.steps), outputs.value)
         length = trial.norm * step.share
         last, radius = self.radius, self.radius_after(step, ratio)
         self.shift = next_shift(trial.shift, trial.norm, radius)
         self.radius = radius
         short = length < SHORT_LENGTH * max(1.0, radius)
-        stalled = ratio <= 1e-4 or (short and not (outcome.feasible and length > NO_LENGTH))
+        stalled = ratio <= 1e-4 or (short and not (ended.feasible and length > NO_LENGTH))
         self.stalled = self.stalled + 1 if stalled else 0
         if ratio <= 1e-4:
             if not self.cautious:  # the same again, as a plain step
@@ -233,47 +221,47 @@ class _Iteration(BoundedSteps[X]):
             self.cautious = True
             return False
         self.objective.accept(moved_step, model)
-        outcome.x, outcome.outputs, outcome.barrier = x, outputs, moved
+        ended.x, ended.outputs, ended.z = x, outputs, moved
         if step.reaction is not None:  # by other multipliers costs cannot be compared
-            outcome.kept = None
-        outcome.keep_best(self.objective.bounds)
+            ended.kept = None
+        ended.keep_best(self.objective.bounds)
         if self.cautious:
             self._reduce_mu(step)
         self._raise_mu(step)
         self.cautious = self.plain
-        self.product = outcome.barrier.mean_product()
-        violation = outcome.violation
+        self.product = ended.z.mean_product()
+        violation = ended.violation
         if violation <= MATCHED:
             self.radius, self.radius_to_restore = max(self.radius, self.radius_to_restore), 0.0
         self.violations.append(violation)
-        self._mark(x)
+        self._save(x)
         return True
 
     def _hold(self, reaction: Array | None, sign: float) -> float:
         """Change multipliers of equations by a step's, or take it back; returns what that adds."""
         if reaction is None:
             return 0.0
-        return self.objective.hold(self.outcome.x, sign * reaction)
+        return self.objective.hold(self.ended.x, sign * reaction)
 
-    def _mark(self, x: X) -> None:
-        """Mark a point: the last one before the product falls to half of what it was at first."""
-        product, marks = self.product, self.marks
-        if not marks or product < 0.5 * self.marked:
-            self.marked = product
-            marks.append((product, x))
-        elif product <= MARKED_AGAIN * self.marked:
-            marks[-1] = min(product, self.marked), x
+    def _save(self, x: X) -> None:
+        """Save an iterate: the last one before the product halves."""
+        product, saved = self.product, self.ended.saved
+        if not saved or product < 0.5 * self.first_product:
+            self.first_product = product
+            saved.append((product, x))
+        elif product <= SAVED_AGAIN * self.first_product:
+            saved[-1] = min(product, self.first_product), x
 
     def _end(self, model: QuadraticModel) -> None:
         """End at a stationary point with its exact model."""
-        self.outcome.why, self.outcome.model = Reason.STATIONARY, model
+        self.ended.why, self.ended.model = Reason.STATIONARY, model
 
     def _leave_saddle(self) -> bool:
         """Prepare for steps along negative curvature, which turned up at the end; False for none.
 
         None follow where a saddle is to be an end, and after the last of MAX_SADDLES.
         """
-        self.saddles, self.saddle, self.stalled = self.saddles + 1, self.outcome.x, 0
+        self.saddles, self.saddle, self.stalled = self.saddles + 1, self.ended.x, 0
         return self.criteria.escape_saddles and self.saddles <= MAX_SADDLES
 
     def _is_hopeless(self) -> bool:
@@ -287,8 +275,8 @@ class _Iteration(BoundedSteps[X]):
 
     def _reopened(self) -> bool:
         """Whether the slacks were moved away from their bounds again, to go on from there."""
-        outcome, objective = self.outcome, self.objective
-        outside = outcome.violation
+        ended, objective = self.ended, self.objective
+        outside = ended.violation
         if not objective.reopens or self.reopenings >= MAX_REOPENINGS or outside > LARGEST_REOPENED:
             return False
         self.reopenings += 1
@@ -299,20 +287,21 @@ class _Iteration(BoundedSteps[X]):
 
     def _move_inside(self, mu: float, margin: float) -> None:
         """Move slacks away from their bounds, with a barrier parameter to go on with."""
-        outcome = self.outcome
-        bounds, y = self.objective.bounds, outcome.outputs.y
-        outcome.barrier = Barrier.central(bounds, y, mu, outcome.barrier.scale, margin)
-        self._drop_marks(mu)
-        self.product = outcome.barrier.mean_product()
+        ended = self.ended
+        bounds, y = self.objective.bounds, ended.outputs.y
+        ended.z = Barrier.central(bounds, y, mu, ended.z.scale, margin)
+        self._drop_saved(mu)
+        self.product = ended.z.mean_product()
         self.shift, self.radius = 0.0, max(self.radius, 1.0)
         self.radius_to_restore = 0.0
         self.stalled, self.cautious = 0, self.plain
         self.violations.clear()
 
-    def _drop_marks(self, mu: float) -> None:
-        """Drop the points with a smaller barrier parameter: they are no longer on the way."""
-        self.marks[:] = [mark for mark in self.marks if mark[0] > mu]
-        self.marked = self.marks[-1][0] if self.marks else 0.0
+    def _drop_saved(self, mu: float) -> None:
+        """Drop saved iterates with a smaller barrier parameter: they are no longer on the way."""
+        saved = self.ended.saved
+        saved[:] = [each for each in saved if each[0] > mu]
+        self.first_product = saved[-1][0] if saved else 0.0
 
     def _finished(self, step: BoundedStep, accepted: bool) -> bool:
         """Whether the last step, of the last mu, predicts next to nothing for its whole length."""
@@ -322,48 +311,48 @@ class _Iteration(BoundedSteps[X]):
         small = step.remaining <= SHORT_STEP_SHARE * enough
         if whole:
             small = max(step.remaining, step.decrease) <= enough
-        if not (last and small and step.trial.newton and self.outcome.feasible):
+        if not (last and small and step.trial.newton and self.ended.feasible):
             return False
-        self.unmet = 0 if self.objective.meets_equations(self.outcome.x) else self.unmet + 1
+        self.unmet = 0 if self.objective.meets_equations(self.ended.x) else self.unmet + 1
         return self.unmet % MAX_UNMET == 0
 
     def _reduce_mu(self, step: BoundedStep) -> None:
         """Reduce mu after a plain step once its problem is solved."""
-        outcome, barrier = self.outcome, self.outcome.barrier
+        ended, barrier = self.ended, self.ended.z
         last, share = self.final_mu, barrier.mu / self.density
         solved = (
             step.trial.newton
             and step.decrease <= 10 * barrier.mu * self._measure
-            and outcome.violation <= max(FEASIBILITY_TOLERANCE, 0.1 * share)
+            and ended.violation <= max(FEASIBILITY_TOLERANCE, 0.1 * share)
             and barrier.complementarity() <= 10 * barrier.mu
         )
         if solved:
             mu = max(last, min(0.1 * barrier.mu, self.density * share**1.5))
-            outcome.barrier = barrier.with_mu(mu)
+            ended.z = barrier.with_mu(mu)
 
     def _raise_mu(self, step: BoundedStep) -> None:
         """Raise mu if bounds have cut several steps in a row: steps along them would stay short."""
-        outcome, objective = self.outcome, self.objective
+        ended, objective = self.ended, self.objective
         cut = step.share < (SHORT_SHARE if step.trial.newton else CUT_SHARE)
-        self.cut = self.cut + 1 if cut and outcome.feasible and not objective.reopens else 0
-        mu = min(RAISED * max(outcome.barrier.mu, self.product), INITIAL_MU * self.density)
-        if self.cut < MOST_CUT or mu <= outcome.barrier.mu:
+        self.cut = self.cut + 1 if cut and ended.feasible and not objective.reopens else 0
+        mu = min(RAISED * max(ended.z.mu, self.product), INITIAL_MU * self.density)
+        if self.cut < MOST_CUT or mu <= ended.z.mu:
             return
-        bounds, y, scale = objective.bounds, outcome.outputs.y, outcome.barrier.scale
-        outcome.barrier = Barrier.central(bounds, y, mu, scale, LEAST_RAISED_GAP)
+        bounds, y, scale = objective.bounds, ended.outputs.y, ended.z.scale
+        ended.z = Barrier.central(bounds, y, mu, scale, LEAST_RAISED_GAP)
         self.cut = 0
-        self._drop_marks(mu)
+        self._drop_saved(mu)
 
     def _refined(self, at_end: bool) -> bool:
         """Whether outputs were replaced by others, which bound less."""
-        level, outcome = self.product / self.density, self.outcome
-        early = level > self.level or outcome.violation > level
+        level, ended = self.product / self.density, self.ended
+        early = level > self.level or ended.violation > level
         if early and not at_end:
-            return self._replaced(self.objective.refine_at_once(outcome.x))
+            return self._replaced(self.objective.refine_at_once(ended.x))
         if self.refinements >= MAX_REFINEMENTS:
             return False
         self.level = NEXT_REFINEMENT * min(level, self.level)
-        found = self._replaced(self.objective.refine(outcome.x, level))
+        found = self._replaced(self.objective.refine(ended.x, level))
         self.refinements += int(found)
         return found
 
@@ -371,13 +360,13 @@ class _Iteration(BoundedSteps[X]):
         """Whether outputs were replaced; then their slacks and multipliers are, too."""
         if found is None:
             return False
-        outcome, kept = self.outcome, self.outcome.kept
-        outputs = self.objective.outputs(outcome.x)  # these may run out of time, so first of all
+        ended, kept = self.ended, self.ended.kept
+        outputs = self.objective.outputs(ended.x)  # these may run out of time, so first of all
         if kept is not None:
-            last = kept[0] is outcome.x
+            last = kept[0] is ended.x
             kept = kept[0], outputs if last else self.objective.outputs(kept[0])
-        before = outcome.outputs.y[found.kept]
-        barrier = outcome.barrier.refined(
+        before = ended.outputs.y[found.kept]
+        barrier = ended.z.refined(
             self.objective.bounds, outputs.y, found.kept, found.origin, before
         )
         beyond = barrier.outside(outputs.y)
@@ -393,8 +382,8 @@ class _Iteration(BoundedSteps[X]):
         mu = min(REOPENED * outside, MOST_REOPENED) * self.density
         if mu > barrier.mu:  # room for the others to move
             barrier = barrier.warm(barrier.bounds, outputs.y, mu, REOPENED * outside)
-        outcome.outputs, outcome.kept = outputs, kept
+        ended.outputs, ended.kept = outputs, kept
         self.product = barrier.mean_product()
-        outcome.barrier = barrier.with_mu(max(barrier.mu, self.product))
+        ended.z = barrier.with_mu(max(barrier.mu, self.product))
         self.radius = max(self.radius, 1.0)
         return True

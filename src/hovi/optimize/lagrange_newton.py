@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import field
 from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
@@ -20,13 +19,12 @@ import numpy.typing as npt
 
 from hovi.optimize.constrained_model import ConstrainedModel, EqualityObjective, size_of
 from hovi.optimize.criteria import Criteria
-from hovi.optimize.ended import Iteration, Reason
+from hovi.optimize.ended import Ended, Iteration, Outputs, Reason
 from hovi.optimize.quadratic_model import Factor
 from hovi.optimize.restoration import restore
-from hovi.optimize.trust_region import Outcome
-from hovi.system.dataclass import dataclass
-from hovi.system.deadline import Deadline, OutOfTimeError, raise_if_late
-from hovi.system.interruption import raise_if_interrupted, record_interrupt
+from hovi.optimize.start import Start
+from hovi.system.deadline import raise_if_late
+from hovi.system.interruption import raise_if_interrupted
 
 Array = npt.NDArray[np.float64]
 X = TypeVar("X")
@@ -70,58 +68,30 @@ REMAINING_DECREASE = 1e-26
 """Estimated relative decrease that may remain after the last step."""
 
 
-@dataclass()
-class ConstrainedOutcome(Outcome[X]):
-    """The final point with its multipliers.
-
-    penalty: with which a minimum has a positive definite Hessian. stuck: whether |c| has a minimum
-    there that is not zero, so that the equations cannot be met nearby.
-    """
-
-    multipliers: Array = field(default_factory=lambda: np.zeros(0))
-    penalty: float = 1.0
-    stuck: bool = False
-
-
 def minimize_under_equations(
     objective: EqualityObjective[X],
-    x: X,
-    penalty: float,
+    start: Start[X, Array],
     criteria: Criteria,
-    multipliers: Array | None = None,
     report: Callable[[int, float], None] | None = None,
-) -> ConstrainedOutcome[X]:
-    """Minimise f under c = 0 from x; a KeyboardInterrupt ends it with the last point.
+) -> Ended[X, Array]:
+    """Minimise f under c = 0 from a point; a KeyboardInterrupt ends it with the last point.
 
-    penalty: the first one, by which A^T A is to exceed the negative curvature across c = 0.
-    multipliers: at a nearby minimum; zero when None.
+    It ends as INFEASIBLE where |c| has a minimum that is not zero.
+    start.z: multipliers at a nearby minimum; zero when None.
     """
-    value, residual = objective.evaluate(x)
-    start = np.zeros_like(residual) if multipliers is None else multipliers
-    first = x, value, Reason.ITERATION_LIMIT, 0
-    outcome = ConstrainedOutcome(*first, multipliers=start, penalty=penalty)
-    if not math.isfinite(value) or not np.isfinite(residual).all():
-        outcome.why = Reason.DIVERGED
-        return outcome
-    try:
-        with Deadline(criteria.time_limit).in_force():
-            _Search(objective, outcome, residual, criteria, report).run()
-    except OutOfTimeError:
-        outcome.why = Reason.TIME_LIMIT
-    except KeyboardInterrupt:
-        record_interrupt()
-        outcome.why = Reason.INTERRUPTED
-    except (ArithmeticError, np.linalg.LinAlgError):
-        outcome.why = Reason.DIVERGED
-    return outcome
+    outputs = objective.evaluate(start.x)
+    z = np.zeros_like(outputs.y) if start.z is None else start.z
+    ended = Ended(start.x, outputs, z, penalty=objective.penalty)
+    with ended.recorded_end(criteria.time_limit):
+        _Search(objective, ended, criteria, report).run()
+    return ended
 
 
 class _Trial(NamedTuple):
     """An accepted step: where it leads, f and c there, its share, and whether f decides."""
 
     x: object
-    value: float
-    residual: Array
+    outputs: Outputs
     share: float
     by_value: bool
 
@@ -143,23 +113,21 @@ class _Filter:
 
 
 class _Search(Generic[X]):
-    """The iteration; the outcome holds its point and multipliers."""
+    """The iteration; `ended` has its current point and multipliers."""
 
     def __init__(
         self,
         objective: EqualityObjective[X],
-        outcome: ConstrainedOutcome[X],
-        residual: Array,
+        ended: Ended[X, Array],
         criteria: Criteria,
         report: Callable[[int, float], None] | None,
     ) -> None:
         self.objective = objective
-        self.outcome = outcome
-        self.residual = residual
-        self.size = size_of(residual)
+        self.ended = ended
+        self.size = size_of(ended.outputs.y)
         self.criteria = criteria
         self.report = report
-        self.max_penalty = MAX_PENALTY_RATIO * outcome.penalty
+        self.max_penalty = MAX_PENALTY_RATIO * ended.penalty
         first = max(1.0, self.size)
         self.largest, self.small = 1e4 * first, 1e-4 * first
         self.filter = _Filter()
@@ -169,12 +137,14 @@ class _Search(Generic[X]):
         self.exact = False
 
     def run(self) -> None:
-        """Steps until a stop."""
-        while self.outcome.iterations < self.criteria.max_iterations:
+        """Steps until one of the reasons to end."""
+        if not (math.isfinite(self.ended.value) and np.isfinite(self.ended.outputs.y).all()):
+            raise ArithmeticError("the problem is not defined at the first point")
+        while len(self.ended.steps) < self.criteria.max_iterations:
             raise_if_interrupted()
             raise_if_late()
             self.exact = self.decrease <= EXACT_DECREASE
-            model = self.objective.model(self.outcome.x, self.outcome.multipliers, self.exact)
+            model = self.objective.model(self.ended.x, self.ended.z, self.exact)
             factor, shift = self._factor(model)
             if factor is not None and self._step(model, factor, shift):
                 return
@@ -183,18 +153,18 @@ class _Search(Generic[X]):
 
     def _factor(self, model: ConstrainedModel) -> tuple[Factor | None, float]:
         """The factor of a definite K with the smallest shift; None where there is none."""
-        outcome = self.outcome
-        factor = model.factor(outcome.penalty, 0.0)
+        ended = self.ended
+        factor = model.factor(ended.penalty, 0.0)
         if factor is None and model.factor(self.max_penalty, 0.0) is not None:
-            while factor is None and outcome.penalty < self.max_penalty:
-                outcome.penalty = min(PENALTY_GROWTH * outcome.penalty, self.max_penalty)
-                factor = model.factor(outcome.penalty, 0.0)
+            while factor is None and ended.penalty < self.max_penalty:
+                ended.penalty = min(PENALTY_GROWTH * ended.penalty, self.max_penalty)
+                factor = model.factor(ended.penalty, 0.0)
         if factor is not None:
             return factor, 0.0
         known = self.shift > 0.0
         shift = SHIFT_DECREASE * self.shift if known else FIRST_SHIFT * model.curvature_scale
         for _ in range(MAX_SHIFTS):
-            factor = model.factor(outcome.penalty, shift)
+            factor = model.factor(ended.penalty, shift)
             if factor is not None:
                 self.shift = shift
                 return factor, shift
@@ -203,36 +173,35 @@ class _Search(Generic[X]):
 
     def _step(self, model: ConstrainedModel, factor: Factor, shift: float) -> bool:
         """Take a step; whether the iteration ends."""
-        outcome, c = self.outcome, self.residual
+        ended, c = self.ended, self.ended.outputs.y
         accuracy = min(max(min(self.before, 1.0) ** 2, LEAST_ACCURACY), FIRST_ACCURACY)
-        step, change = model.solve(factor, outcome.penalty, c, accuracy)
+        step, change = model.solve(factor, ended.penalty, c, accuracy)
         if not np.isfinite(step).all():
             return not self._restore()
         curvature = abs(float(step @ model.hessian_product(step)))
-        new = outcome.multipliers + change
+        new = ended.z + change
         decrease = 0.5 * curvature + abs(float(new @ c))
-        relative = decrease / max(abs(outcome.value), 1e-300)
+        relative = decrease / max(abs(ended.value), 1e-300)
         self.decrease = relative
         settled = self.exact and relative <= self.criteria.decrease
-        settled = settled and self.objective.feasible(outcome.x)
+        settled = settled and self.objective.feasible(ended.x)
         if settled and shift > 0.0:
             return self._at_saddle(model, factor, shift)
         trial = self._search_along(model, factor, step)
-        outcome.iterations += 1
-        value, share = (outcome.value, 0.0) if trial is None else (trial.value, trial.share)
+        value, share = (ended.value, 0.0) if trial is None else (trial.outputs.value, trial.share)
         length, residual = model.length(step), self.size
-        outcome.history.append(Iteration(value, decrease, share, shift, length, residual))
+        ended.steps.append(Iteration(value, decrease, share, shift, length, residual))
         if self.report is not None:
-            self.report(outcome.iterations, value)
+            self.report(len(ended.steps), value)
         if trial is None:
-            return self._ended(outcome.x) if settled else not self._restore()
+            return self._at_minimum() if settled else not self._restore()
         if not trial.by_value:
-            self.filter.add(outcome.value, self.size)
+            self.filter.add(ended.value, self.size)
         self._move(trial)
-        outcome.multipliers = outcome.multipliers + trial.share * change
+        ended.z = ended.z + trial.share * change
         last = settled and self._is_last(relative)
         self.before = relative if shift == 0.0 and trial.share == 1.0 else math.inf
-        return last and self._ended(outcome.x)
+        return last and self._at_minimum()
 
     def _is_last(self, decrease: float) -> bool:
         """Whether only rounding errors remain after a Newton step of this relative decrease."""
@@ -240,30 +209,30 @@ class _Search(Generic[X]):
             return True
         return decrease * (decrease / self.before) ** 2 <= REMAINING_DECREASE
 
-    def _ended(self, x: X) -> bool:
+    def _at_minimum(self) -> bool:
         """End in a minimum."""
-        self.outcome.why, self.outcome.convex = Reason.STATIONARY, True
+        self.ended.why, self.ended.convex = Reason.STATIONARY, True
         return True
 
     def _move(self, trial: _Trial) -> None:
-        self.outcome.x = trial.x  # type: ignore[assignment]
-        self.outcome.value, self.residual = trial.value, trial.residual
-        self.size = size_of(trial.residual)
+        self.ended.x = trial.x  # type: ignore[assignment]
+        self.ended.outputs = trial.outputs
+        self.size = size_of(trial.outputs.y)
 
     def _search_along(self, model: ConstrainedModel, factor: Factor, step: Array) -> _Trial | None:
         """The largest share of a step, halved again and again, that the filter accepts."""
-        outcome = self.outcome
+        ended = self.ended
         slope = float(model.slope @ step)
         share = 1.0
         while share >= LEAST_SHARE:
-            x = self.objective.retract(outcome.x, share * step, model)
-            value, residual = self.objective.evaluate(x)
-            size = size_of(residual)
-            accepted = self._accepted(value, size, share, slope)
+            x = self.objective.retract(ended.x, share * step, model)
+            there = self.objective.evaluate(x)
+            size = size_of(there.y)
+            accepted = self._accepted(there.value, size, share, slope)
             if accepted is not None:
-                return _Trial(x, value, residual, share, accepted)
+                return _Trial(x, there, share, accepted)
             if share == 1.0 and size >= 0.5 * self.size and math.isfinite(size):
-                corrected = self._corrected(model, factor, residual, slope)
+                corrected = self._corrected(model, factor, there.y, slope)
                 if corrected is not None:
                     return corrected
             share *= 0.5
@@ -275,7 +244,7 @@ class _Search(Generic[X]):
             return None
         if not self.filter.accepts(value, size):
             return None
-        now, before = self.outcome.value, self.size
+        now, before = self.ended.value, self.size
         noise = ROUNDING * abs(now)
         if (
             before <= self.small
@@ -290,46 +259,43 @@ class _Search(Generic[X]):
         self, model: ConstrainedModel, factor: Factor, residual: Array, slope: float
     ) -> _Trial | None:
         """The whole step with second-order corrections, if it is accepted."""
-        outcome, total = self.outcome, self.residual
+        ended, total = self.ended, self.ended.outputs.y
         size = size_of(residual)
         for _ in range(MAX_SECOND_ORDER_CORRECTIONS):
             total = total + residual
-            step, _ = model.solve(factor, outcome.penalty, total, FIRST_ACCURACY)
-            x = self.objective.retract(outcome.x, step, model)
-            value, residual = self.objective.evaluate(x)
+            step, _ = model.solve(factor, ended.penalty, total, FIRST_ACCURACY)
+            x = self.objective.retract(ended.x, step, model)
+            there = self.objective.evaluate(x)
+            residual = there.y
             before, size = size, size_of(residual)
-            accepted = self._accepted(value, size, 1.0, slope)
+            accepted = self._accepted(there.value, size, 1.0, slope)
             if accepted is not None:
-                return _Trial(x, value, residual, 1.0, accepted)
+                return _Trial(x, there, 1.0, accepted)
             if not size < 0.99 * before:
                 break
         return None
 
     def _restore(self) -> bool:
         """Make the residual alone smaller, and begin again there; whether that succeeded."""
-        outcome, left = self.outcome, self.criteria.max_iterations - self.outcome.iterations
+        ended, left = self.ended, self.criteria.max_iterations - len(self.ended.steps)
         self.restorations += 1
-        outcome.why = Reason.DIVERGED
+        ended.why = Reason.DIVERGED
         if self.restorations > MAX_RESTORATIONS:
             return False
-        found = restore(self.objective, outcome.x, left)
-        outcome.x, outcome.value, self.residual = found.x, found.value, found.residual
-        self.size = size_of(found.residual)
-        for size, step in zip(found.residuals, found.lengths, strict=True):
-            outcome.history.append(Iteration(found.value, 0.0, 1.0, 0.0, step, size))
-        outcome.iterations += len(found.residuals)
-        outcome.stuck = found.stuck
-        if found.stuck:
+        found = restore(self.objective, Start(ended.x), Criteria(max_iterations=left))
+        ended.x, ended.outputs, ended.steps = found.x, found.outputs, ended.steps + found.steps
+        self.size = size_of(found.outputs.y)
+        if found.why is Reason.INFEASIBLE:
+            ended.why = found.why
             return False
-        outcome.multipliers = found.multipliers
+        ended.z, ended.why = found.z, Reason.ITERATION_LIMIT
         self.filter, self.shift, self.before = _Filter(), 0.0, math.inf
-        outcome.why = Reason.ITERATION_LIMIT
         return True
 
     def _at_saddle(self, model: ConstrainedModel, factor: Factor, shift: float) -> bool:
         """Leave a saddle along negative curvature; whether the iteration ends instead."""
-        outcome = self.outcome
-        outcome.why = Reason.STATIONARY
+        ended = self.ended
+        ended.why = Reason.STATIONARY
         along = self._lowest(model, factor)
         curvature = float(along @ model.hessian_product(along))
         if not self.criteria.escape_saddles or curvature >= 0.0:
@@ -337,19 +303,18 @@ class _Search(Generic[X]):
         trial = self._along_curvature(model, factor, along, curvature)
         if trial is None:
             return True
-        outcome.saddles_left.append(outcome.value)
-        outcome.iterations += 1
-        decrease = outcome.value - trial.value
+        ended.saddles.append(ended.value)
+        decrease = ended.value - trial.outputs.value
         radius = trial.share
-        outcome.history.append(Iteration(trial.value, decrease, 1.0, shift, radius, self.size))
+        ended.steps.append(Iteration(trial.outputs.value, decrease, 1.0, shift, radius, self.size))
         self._move(trial)
         self.filter, self.before = _Filter(), math.inf
-        outcome.why = Reason.ITERATION_LIMIT
+        ended.why = Reason.ITERATION_LIMIT
         return False
 
     def _lowest(self, model: ConstrainedModel, factor: Factor) -> Array:
         """The tangent direction of lowest curvature relative to D, by inverse iteration."""
-        none, penalty = np.zeros_like(self.residual), self.outcome.penalty
+        none, penalty = np.zeros_like(self.ended.z), self.ended.penalty
         u = model.plain.random_vector(seed=0)
         for _ in range(4):
             force = model.plain.metric_product(u)
@@ -361,19 +326,19 @@ class _Search(Generic[X]):
         self, model: ConstrainedModel, factor: Factor, along: Array, curvature: float
     ) -> _Trial | None:
         """A point on c = 0 with a smaller value, along a direction of negative curvature."""
-        outcome, length = self.outcome, self.criteria.radius
+        ended, length = self.ended, self.criteria.radius
         none = np.zeros_like(model.gradient)
-        weight = 2.0 * float(np.linalg.norm(outcome.multipliers))
+        weight = 2.0 * float(np.linalg.norm(ended.z))
         while length > LEAST_SHARE * self.criteria.radius:
             step = length * along
-            x = self.objective.retract(outcome.x, step, model)
-            value, residual = self.objective.evaluate(x)
-            if np.isfinite(residual).all():
-                back, _ = model.solve_for(none, factor, outcome.penalty, residual, 1e-4)
-                x = self.objective.retract(outcome.x, step + back, model)
-                value, residual = self.objective.evaluate(x)
-                merit = value + weight * size_of(residual)
-                if merit < outcome.value + 0.25 * length**2 * curvature:
-                    return _Trial(x, value, residual, length, True)
+            x = self.objective.retract(ended.x, step, model)
+            there = self.objective.evaluate(x)
+            if np.isfinite(there.y).all():
+                back, _ = model.solve_for(none, factor, ended.penalty, there.y, 1e-4)
+                x = self.objective.retract(ended.x, step + back, model)
+                there = self.objective.evaluate(x)
+                merit = there.value + weight * size_of(there.y)
+                if merit < ended.value + 0.25 * length**2 * curvature:
+                    return _Trial(x, there, length, True)
             length *= 0.5
         return None

@@ -24,10 +24,11 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.optimize.barrier import Barrier
-from hovi.optimize.bounded_objective import BoundedObjective, BoundedOutcome
-from hovi.optimize.criteria import Criteria
-from hovi.optimize.ended import Iteration, Reason
+from hovi.optimize.bounded_objective import BoundedObjective
+from hovi.optimize.criteria import ROOM, Criteria
+from hovi.optimize.ended import Ended, Iteration, Reason
 from hovi.optimize.quadratic_model import QuadraticModel
+from hovi.optimize.start import Start
 from hovi.system.deadline import raise_if_late
 from hovi.system.interruption import raise_if_interrupted
 
@@ -41,8 +42,6 @@ DECREASE = 0.1
 """Ratio of the barrier parameters of two steps."""
 GAP_WEIGHT = 3.0
 """Least weight c of a gap against a multiplier, relative to the mean density."""
-ROOM = 2e-7
-"""Distance by which bounds are moved inwards, and outputs may miss them at the end."""
 LARGEST_GROWTH, LEAST_OUTSIDE = 4.0, 3e-4
 """Largest distance of outputs outside their bounds after a step, relative to their first distance
 from the bounds or the known slacks; and the least value of that first distance. Beyond, the
@@ -51,27 +50,24 @@ iteration does not converge."""
 
 def follow_bounded(
     objective: BoundedObjective[X],
-    x: X,
-    known: Barrier,
+    start: Start[X, Barrier],
     criteria: Criteria,
     report: Callable[[int, float], None] | None = None,
-    most_outside: float = ROOM,
-) -> BoundedOutcome[X]:
+) -> Ended[X, Barrier]:
     """Minimise from a point near the solution, whose slacks and multipliers are nearly known.
 
     It ends as DIVERGED where the steps do not converge, or not to a minimum.
-    known: of the solution of a similar problem with as many outputs.
+    start.z: of the solution of a similar problem with as many outputs.
     criteria: `barrier` is the last barrier parameter; it ends where the next step predicts, and the
-        distance of slacks from outputs means, less than `enough` of the objective.
-    most_outside: how far outputs may be outside their bounds at the end, relative to the range; if
-        more than ROOM, only the objective is wanted, and outputs are not refined.
+        distance of slacks from outputs means, less than `enough` of the objective. If outputs may
+        be further than ROOM `outside` at the end, they are not refined.
     """
-    outcome = BoundedOutcome(x, objective.outputs(x), known, Reason.DIVERGED)
-    if not np.isfinite(outcome.outputs.value):
-        return outcome
-    with outcome.recorded_end(criteria.time_limit):
-        _Newton(objective, outcome, criteria, report, most_outside).run()
-    return outcome
+    assert start.z is not None
+    ended = Ended(start.x, objective.outputs(start.x), start.z, Reason.DIVERGED)
+    if np.isfinite(ended.value):
+        with ended.recorded_end(criteria.time_limit):
+            _Newton(objective, ended, criteria, report).run()
+    return ended
 
 
 class _Newton(Generic[X]):
@@ -80,15 +76,14 @@ class _Newton(Generic[X]):
     def __init__(
         self,
         objective: BoundedObjective[X],
-        outcome: BoundedOutcome[X],
+        ended: Ended[X, Barrier],
         criteria: Criteria,
         report: Callable[[int, float], None] | None,
-        most_outside: float,
     ) -> None:
-        self.objective, self.outcome, self.most_outside = objective, outcome, most_outside
+        self.objective, self.ended = objective, ended
         self.criteria, self.report = criteria, report
-        outputs, bounds = outcome.outputs, objective.bounds.shrunk(ROOM)
-        known = dataclasses.replace(outcome.barrier, bounds=bounds)
+        outputs, bounds = ended.outputs, objective.bounds.shrunk(ROOM)
+        known = dataclasses.replace(ended.z, bounds=bounds)
         self.density = abs(outputs.value) / objective.bounds.measure
         self.last_mu = criteria.barrier * self.density
         self.weight = GAP_WEIGHT * self.density
@@ -96,72 +91,70 @@ class _Newton(Generic[X]):
         apart = float(np.max(np.abs(outputs.y - known.s), initial=0.0))
         self.farthest = LARGEST_GROWTH * max(outside, LEAST_OUTSIDE, apart)
         mu = min(FIRST_MU * outside**2, LARGEST_FIRST_MU) * self.density
-        outcome.barrier = known.recentered(self.weight, max(self.last_mu, mu))
+        ended.z = known.recentered(self.weight, max(self.last_mu, mu))
         self.outside, self.work = 0.0, math.inf
-        outcome.keep_best(objective.bounds)
+        ended.keep_best(objective.bounds)
 
     def run(self) -> None:
         """Iterate until stationary, or until it does not converge."""
-        outcome = self.outcome
+        ended = self.ended
         while self.outside <= self.farthest:  # not where it is no number
             raise_if_interrupted()
             raise_if_late()
-            terms = outcome.barrier.condensed(outcome.outputs.y)
-            model = self.objective.model(outcome.x, *terms)
+            terms = ended.z.condensed(ended.outputs.y)
+            model = self.objective.model(ended.x, *terms)
             factor = model.factor(0.0)
             if factor is None:
                 return
             step, slope, length = model.descend(factor)
             if self._is_solved(-0.5 * slope):
-                if self.most_outside <= ROOM and self._refined():
+                if self.criteria.outside <= ROOM and self._refined():
                     continue
-                barrier = dataclasses.replace(outcome.barrier, bounds=self.objective.bounds)
-                outcome.barrier = barrier.at_outputs(outcome.outputs.y)
-                outcome.model, outcome.why = model, Reason.STATIONARY
-                outcome.marks.append((outcome.barrier.mu, outcome.x))
+                ended.z = ended.z.at_outputs(self.objective.bounds, ended.outputs.y)
+                ended.model, ended.why = model, Reason.STATIONARY
+                ended.saved.append((ended.z.mu, ended.x))
                 return
-            if outcome.iterations >= self.criteria.max_iterations:
+            if len(ended.steps) >= self.criteria.max_iterations:
                 return
             self._take(step, -0.5 * slope, math.sqrt(max(length, 0.0)), model)
 
     def _take(self, step: Array, decrease: float, norm: float, model: QuadraticModel) -> None:
         """Take a Newton step, which predicts a decrease."""
-        outcome, objective = self.outcome, self.objective
-        barrier, before = outcome.barrier, outcome.outputs
+        ended, objective = self.ended, self.objective
+        barrier, before = ended.z, ended.outputs
         dy = objective.push(step, model)
-        x = objective.retract(outcome.x, step, model)
+        x = objective.retract(ended.x, step, model)
         outputs = objective.outputs(x)
         objective.accept(step, model)
         mu = max(self.last_mu, DECREASE * barrier.mu)
         moved, self.outside, self.work = barrier.followed(before.y, dy, outputs.y, mu, self.weight)
-        outcome.x, outcome.outputs, outcome.barrier = x, outputs, moved
-        outcome.iterations += 1
-        outcome.history.append(Iteration(outputs.value, decrease, 1.0, 0.0, norm))
+        ended.x, ended.outputs, ended.z = x, outputs, moved
+        ended.steps.append(Iteration(outputs.value, decrease, 1.0, 0.0, norm))
         if self.report is not None:
-            self.report(outcome.iterations, outputs.value)
-        outcome.keep_best(objective.bounds)
+            self.report(len(ended.steps), outputs.value)
+        ended.keep_best(objective.bounds)
 
     def _is_solved(self, decrease: float) -> bool:
         """Whether outputs are within their bounds, and next to nothing is to be gained.
 
         decrease: what the next step predicts.
         """
-        outcome = self.outcome
-        if outcome.iterations == 0 or outcome.barrier.mu > self.last_mu:
+        ended = self.ended
+        if len(ended.steps) == 0 or ended.z.mu > self.last_mu:
             return False
-        enough = max(self.criteria.decrease, self.criteria.enough) * abs(outcome.outputs.value)
-        return self.outside <= self.most_outside and max(decrease, self.work) <= enough
+        enough = max(self.criteria.decrease, self.criteria.enough) * abs(ended.outputs.value)
+        return self.outside <= self.criteria.outside and max(decrease, self.work) <= enough
 
     def _refined(self) -> bool:
         """Whether outputs were replaced by others."""
-        outcome, objective = self.outcome, self.objective
-        found = objective.refine(outcome.x, outcome.barrier.mu / self.density)
+        ended, objective = self.ended, self.objective
+        found = objective.refine(ended.x, ended.z.mu / self.density)
         if found is None:
             return False
-        before = outcome.outputs.y[found.kept]
-        outcome.outputs, outcome.kept = objective.outputs(outcome.x), None
-        y = outcome.outputs.y
+        before = ended.outputs.y[found.kept]
+        ended.outputs, ended.kept = objective.outputs(ended.x), None
+        y = ended.outputs.y
         bounds = objective.bounds.shrunk(ROOM)
-        refined = outcome.barrier.refined(bounds, y, found.kept, found.origin, before)
-        outcome.barrier = refined.recentered(self.weight, refined.mu)
+        refined = ended.z.refined(bounds, y, found.kept, found.origin, before)
+        ended.z = refined.recentered(self.weight, refined.mu)
         return True

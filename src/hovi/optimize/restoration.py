@@ -7,14 +7,15 @@ stationary point that is not zero. [NocedalWright2006, section 10.3]
 from __future__ import annotations
 
 import math
-from dataclasses import field
-from typing import Generic, TypeVar
+from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
 from hovi.optimize.constrained_model import ConstrainedModel, EqualityObjective, size_of
-from hovi.system.dataclass import dataclass
+from hovi.optimize.criteria import Criteria
+from hovi.optimize.ended import Ended, Iteration, Reason
+from hovi.optimize.start import Start
 from hovi.system.deadline import raise_if_late
 from hovi.system.interruption import raise_if_interrupted
 
@@ -37,70 +38,63 @@ STUCK_DECREASE = 1e-13
 """Relative decrease of |c| that a step predicts at such a point."""
 
 
-@dataclass(eq=False)
-class Restored(Generic[X]):
-    """The point that was reached.
+def restore(
+    objective: EqualityObjective[X], start: Start[X, Array], criteria: Criteria
+) -> Ended[X, Array]:
+    """Steps that decrease the residual; z are least-squares multipliers at the last point.
 
-    multipliers: least-squares multipliers there. stuck: whether |c| has a minimum there, not zero.
-    residuals, lengths: |c| before every step, and its length.
+    It ends as INFEASIBLE where |c| has a minimum that is not zero.
     """
-
-    x: X
-    value: float
-    residual: Array
-    multipliers: Array
-    stuck: bool = False
-    residuals: list[float] = field(default_factory=list)
-    lengths: list[float] = field(default_factory=list)
-
-
-def restore(objective: EqualityObjective[X], x: X, max_steps: int) -> Restored[X]:
-    """Steps from x that decrease the residual."""
-    value, c = objective.evaluate(x)
-    none = np.zeros_like(c)
-    found = Restored(x, value, c, none)
-    first, damping = size_of(c), FIRST_DAMPING
-    model = objective.model(x, none)
+    outputs = objective.evaluate(start.x)
+    none = np.zeros_like(outputs.y)
+    ended = Ended(start.x, outputs, none)
+    first, damping = size_of(outputs.y), FIRST_DAMPING
+    model = objective.model(start.x, none)
     if not model.normal_band.size:  # without unknowns, nothing changes c
-        found.stuck = not objective.feasible(x)
-        return found
-    while len(found.residuals) < min(max_steps, MAX_STEPS):
+        if not objective.feasible(start.x):
+            ended.why = Reason.INFEASIBLE
+        return ended
+    while len(ended.steps) < min(criteria.max_iterations, MAX_STEPS):
         raise_if_interrupted()
         raise_if_late()
-        size = size_of(found.residual)
-        if size <= RESTORED * first or objective.feasible(found.x):
+        size = size_of(ended.outputs.y)
+        if size <= RESTORED * first or objective.feasible(ended.x):
+            ended.why = Reason.STATIONARY
             break
-        step, predicted = _step(model, found.residual, damping)
+        step, predicted = _step(model, ended.outputs.y, damping)
         if predicted < STUCK_DECREASE * size:
-            step, predicted = _step(model, found.residual, STUCK_DAMPING)
+            step, predicted = _step(model, ended.outputs.y, STUCK_DAMPING)
             if predicted < STUCK_DECREASE * size:
-                found.stuck = _is_lowest(objective, found, model)
+                lowest = _is_lowest(objective, ended, model)
+                ended.why = Reason.INFEASIBLE if lowest else Reason.STALLED
                 break
         if damping > MAX_DAMPING:
+            ended.why = Reason.DIVERGED
             break
-        x = objective.retract(found.x, step, model)
-        value, c = objective.evaluate(x)
-        found.residuals.append(size)
-        found.lengths.append(model.length(step))
-        if size - size_of(c) > 0.1 * predicted and math.isfinite(value):
-            found.x, found.value, found.residual = x, value, c
+        x = objective.retract(ended.x, step, model)
+        there = objective.evaluate(x)
+        gained = size - size_of(there.y)
+        ratio, length = gained / predicted, model.length(step)
+        ended.steps.append(Iteration(there.value, predicted, ratio, damping, length, size))
+        if gained > 0.1 * predicted and math.isfinite(there.value):
+            ended.x, ended.outputs = x, there
             damping = max(0.1 * damping, LEAST_DAMPING)
             model = objective.model(x, none)
         else:
             damping *= 10.0
-    found.multipliers = model.least_squares_multipliers()
-    return found
+    ended.z = model.least_squares_multipliers()
+    return ended
 
 
 def _is_lowest(
-    objective: EqualityObjective[X], found: Restored[X], model: ConstrainedModel
+    objective: EqualityObjective[X], ended: Ended[X, Array], model: ConstrainedModel
 ) -> bool:
     """Whether |c|^2 has a minimum at a stationary point, by its Hessian A^T A + sum c_i d2 c_i.
 
     The Hessian of f, which the model contains as well, is outweighed.
     """
     weight = OUTWEIGHING * max(model.curvature_scale / model.normal_scale, 1.0)
-    there = objective.model(found.x, weight * found.residual)
+    there = objective.model(ended.x, weight * ended.outputs.y)
     return there.factor(weight, FLATNESS * weight * model.normal_scale) is not None
 
 

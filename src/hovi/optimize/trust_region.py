@@ -11,7 +11,6 @@ import math
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable
-from dataclasses import field
 from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
@@ -19,7 +18,7 @@ import numpy.typing as npt
 
 from hovi.optimize.chord_steps import REMAINING_DECREASE, polish
 from hovi.optimize.criteria import Criteria
-from hovi.optimize.ended import Iteration, Reason
+from hovi.optimize.ended import Ended, Iteration, Outputs, Reason
 from hovi.optimize.quadratic_model import (
     Factor,
     QuadraticModel,
@@ -27,9 +26,9 @@ from hovi.optimize.quadratic_model import (
     next_radius,
     next_shift,
 )
-from hovi.system.dataclass import dataclass
-from hovi.system.deadline import Deadline, OutOfTimeError, raise_if_late
-from hovi.system.interruption import raise_if_interrupted, record_interrupt
+from hovi.optimize.start import Start
+from hovi.system.deadline import raise_if_late
+from hovi.system.interruption import raise_if_interrupted
 
 Array = npt.NDArray[np.float64]
 X = TypeVar("X")
@@ -45,6 +44,10 @@ LAST_DECREASE, SLOWEST = 1e-14, 0.7
 of successive ones above which steps do not converge."""
 STALLED_STEPS = 5
 """Number of steps that Criteria.stalled compares."""
+
+
+NO_OUTPUTS: Array = np.zeros(0)
+"""What is constrained where nothing is."""
 
 
 class Objective(ABC, Generic[X]):
@@ -74,25 +77,6 @@ class Objective(ABC, Generic[X]):
         """The largest component of a step relative to the size of the data."""
 
 
-@dataclass()
-class Outcome(Generic[X]):
-    """The final point and why the iteration ended.
-
-    value: the objective at x. iterations: number of steps tried, each with an entry in history.
-    saddles_left: values at the saddles that were left along negative curvature.
-    convex: whether the last model was exact, with a positive definite Hessian. model: the last one.
-    """
-
-    x: X
-    value: float
-    why: Reason
-    iterations: int
-    history: list[Iteration] = field(default_factory=list)
-    saddles_left: list[float] = field(default_factory=list)
-    convex: bool = False
-    model: QuadraticModel | None = None
-
-
 class Trial(NamedTuple):
     """A solution of the subproblem min g.s + 1/2 s.H s, |s| <= radius.
 
@@ -116,90 +100,84 @@ class Trial(NamedTuple):
 
 def minimize(
     objective: Objective[X],
-    x: X,
+    start: Start[X, None],
     criteria: Criteria,
     report: Callable[[int, float], None] | None = None,
-) -> Outcome[X]:
-    """Minimise from x; a KeyboardInterrupt ends it with the best point so far."""
-    value = objective.value(x)
-    outcome = Outcome(x, value, Reason.ITERATION_LIMIT, 0)
-    if not math.isfinite(value):
-        outcome.why = Reason.DIVERGED
-        return outcome
-    try:
-        with Deadline(criteria.time_limit).in_force():
-            _iterate(objective, outcome, criteria, report)
-    except OutOfTimeError:
-        outcome.why = Reason.TIME_LIMIT
-    except KeyboardInterrupt:
-        record_interrupt()
-        outcome.why = Reason.INTERRUPTED
-    except ArithmeticError:
-        outcome.why = Reason.DIVERGED
-    return outcome
+) -> Ended[X, None]:
+    """Minimise from a point; a KeyboardInterrupt ends it with the best point so far."""
+    ended = Ended(start.x, _values(objective.value(start.x)), None)
+    with ended.recorded_end(criteria.time_limit):
+        _iterate(objective, ended, criteria, report)
+    return ended
+
+
+def _values(value: float) -> Outputs:
+    """The value of an objective without constraints."""
+    return Outputs(value, NO_OUTPUTS)
 
 
 def _iterate(
     objective: Objective[X],
-    outcome: Outcome[X],
+    ended: Ended[X, None],
     criteria: Criteria,
     report: Callable[[int, float], None] | None,
 ) -> None:
+    if not math.isfinite(ended.value):
+        raise ArithmeticError("the objective is not defined at the first point")
     raise_if_interrupted()
     raise_if_late()
     radius, shift = criteria.radius, 0.0
-    values = deque([outcome.value], STALLED_STEPS + 1)
-    model, exact, before = objective.model(outcome.x, None, None), True, math.inf
-    while outcome.iterations < criteria.max_iterations:
+    values = deque([ended.value], STALLED_STEPS + 1)
+    model, exact, before = objective.model(ended.x, None, None), True, math.inf
+    while len(ended.steps) < criteria.max_iterations:
         raise_if_interrupted()
         raise_if_late()
         trial = solve_subproblem(model, radius, shift)
-        stationary = _is_stationary(objective, outcome, model, trial, criteria)
+        stationary = _is_stationary(objective, ended, model, trial, criteria)
         if stationary and trial.along_negative_curvature and not criteria.escape_saddles:
-            outcome.why = Reason.STATIONARY
+            ended.why = Reason.STATIONARY
             return
         settled = stationary and trial.newton
-        last = settled and _is_last(outcome, trial, exact, before, criteria)
-        candidate = objective.retract(outcome.x, trial.step, model)
+        last = settled and _is_last(ended, trial, exact, before, criteria)
+        candidate = objective.retract(ended.x, trial.step, model)
         value = objective.value(candidate)
-        noise = 1e-14 * abs(outcome.value)
-        ratio = decrease_ratio(outcome.value - value, trial.decrease, noise)
-        outcome.iterations += 1
-        outcome.history.append(Iteration(value, trial.decrease, ratio, trial.shift, radius))
+        noise = 1e-14 * abs(ended.value)
+        ratio = decrease_ratio(ended.value - value, trial.decrease, noise)
+        ended.steps.append(Iteration(value, trial.decrease, ratio, trial.shift, radius))
         if report is not None:
-            report(outcome.iterations, min(value, outcome.value))
+            report(len(ended.steps), min(value, ended.value))
         radius = next_radius(radius, trial.norm, ratio)
-        accepted = ratio > 1e-4 or (settled and value <= outcome.value + 100 * noise)
+        accepted = ratio > 1e-4 or (settled and value <= ended.value + 100 * noise)
         if accepted:
             if trial.along_negative_curvature and stationary:
-                outcome.saddles_left.append(outcome.value)
-            outcome.x, outcome.value = candidate, value
+                ended.saddles.append(ended.value)
+            ended.x, ended.outputs = candidate, _values(value)
         if settled and accepted and exact and not last and trial.factor is not None:
             polished = polish(objective, candidate, value, model, trial.factor, trial.decrease)
             if polished is not None:
-                last, (outcome.x, outcome.value) = True, polished
+                last, ended.x, ended.outputs = True, polished[0], _values(polished[1])
         if last or (settled and not accepted):
-            outcome.why, outcome.convex, outcome.model = Reason.STATIONARY, exact, model
+            ended.why, ended.convex, ended.model = Reason.STATIONARY, exact, model
             return
-        values.append(outcome.value)
+        values.append(ended.value)
         gained, enough = values[0] - values[-1], criteria.stalled * abs(values[0])
         if len(values) > STALLED_STEPS and gained < enough and enough > 0.0:
-            outcome.why = Reason.STALLED
+            ended.why = Reason.STALLED
             return
         shift = next_shift(trial.shift, trial.norm, radius)
         if accepted:
             before = trial.decrease if trial.newton else math.inf
             exact = criteria.exact and (settled or before <= EXACT_MODEL_DECREASE * abs(value))
             known = (None, None) if exact else (model, trial.step)
-            model = objective.model(outcome.x, *known)
+            model = objective.model(ended.x, *known)
         elif radius < 1e-14 * criteria.radius:
-            outcome.why = Reason.DIVERGED
+            ended.why = Reason.DIVERGED
             return
 
 
 def _is_stationary(
     objective: Objective[X],
-    outcome: Outcome[X],
+    ended: Ended[X, None],
     model: QuadraticModel,
     trial: Trial,
     criteria: Criteria,
@@ -209,14 +187,14 @@ def _is_stationary(
         return True
     if not trial.newton:
         return False
-    if trial.decrease <= criteria.decrease * abs(outcome.value):
+    if trial.decrease <= criteria.decrease * abs(ended.value):
         return True
     short = trial.norm <= SIZE_TEST_LENGTH * criteria.radius
-    return short and objective.relative_size(outcome.x, trial.step, model) <= criteria.step
+    return short and objective.relative_size(ended.x, trial.step, model) <= criteria.step
 
 
 def _is_last(
-    outcome: Outcome[X], trial: Trial, exact: bool, before: float, criteria: Criteria
+    ended: Ended[X, None], trial: Trial, exact: bool, before: float, criteria: Criteria
 ) -> bool:
     """Whether the Newton step from a stationary point is accurate enough to be the last one.
 
@@ -225,7 +203,7 @@ def _is_last(
     exact: whether the model is exact. before: predicted decrease of the previous step, infinite
         if that was not a Newton step.
     """
-    size, decrease = abs(outcome.value), trial.decrease
+    size, decrease = abs(ended.value), trial.decrease
     if not criteria.exact or not exact:
         return not criteria.exact
     most = min(criteria.decrease * size, SLOWEST * before)

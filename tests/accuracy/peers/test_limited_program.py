@@ -21,6 +21,7 @@ from hovi.dynamics.symbolic_dynamics import casadi_functions
 from hovi.errors import SchemeError
 from hovi.optimize.criteria import Criteria
 from hovi.optimize.interior_point import minimize_bounded
+from hovi.optimize.start import Start
 from hovi.planning.problem.limits import Limits, as_limits
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.bounded_action import BoundedAction
@@ -151,7 +152,7 @@ def test_assembled_derivatives_are_those_of_the_cost_and_the_constraints(
 def interior_point(problem: TrajectoryProblem, limits: Limits) -> float:
     """The cost of hovi's minimum with limits at the quadrature points."""
     path = guess_path(problem, "cubic")
-    found = minimize_bounded(BoundedAction(problem, limits), path, Criteria(decrease=1e-9))
+    found = minimize_bounded(BoundedAction(problem, limits), Start(path), Criteria(decrease=1e-9))
     assert found.feasible
     return float(found.outputs.value)
 

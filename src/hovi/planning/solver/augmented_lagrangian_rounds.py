@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Generic, Protocol, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
 from hovi.discrete.grid import DiscretePath
-from hovi.optimize.ended import Reason
+from hovi.optimize.ended import Ended, Reason
 from hovi.planning.conditions.condition import describe, is_spurious
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.action_objective import ActionObjective
@@ -44,34 +44,7 @@ FIRST_DECREASE = 1e-3
 """Relative decrease at which a first round stops; later rounds stop by their residual."""
 
 
-class Minimized(Protocol):
-    """The result of one round: its final point and why it ended."""
-
-    x: DiscretePath
-    why: Reason
-
-
-Result = TypeVar("Result", bound=Minimized)
-
-
-@dataclass(frozen=True, eq=False)
-class ConstrainedResult(Generic[Result]):
-    """The result of the iteration.
-
-    result: of the last round. multipliers: of that round, or updated ones after MAX_ROUNDS.
-    residuals: of the constraints. reason: why they cannot be met, as a sentence without its end,
-        or "".
-    """
-
-    result: Result
-    multipliers: Multipliers
-    residuals: Residuals
-    reason: str = ""
-
-    @property
-    def met(self) -> bool:
-        """Whether the constraints hold to their tolerances."""
-        return within(self.residuals, TORQUE_TOLERANCE, NODE_TOLERANCE)
+Result = TypeVar("Result", bound=Ended[DiscretePath, Any])
 
 
 def minimize_constrained(
@@ -80,8 +53,11 @@ def minimize_constrained(
     minimize: Callable[[Multipliers, DiscretePath, float], Result],
     known: Multipliers | None = None,
     most: int = MAX_ROUNDS,
-) -> ConstrainedResult[Result]:
+) -> tuple[Result, Multipliers, str]:
     """Minimise subject to the problem's equality constraints.
+
+    Returns how the last round ended, its multipliers, or updated ones after MAX_ROUNDS, and why the
+    constraints cannot be met, as a sentence without its end, or "".
 
     minimize: minimises the augmented Lagrangian with given multipliers, from a path, to a
         relative decrease.
@@ -96,9 +72,7 @@ def minimize_constrained(
         path = result.x
         residuals = ActionObjective(problem, multipliers=multipliers).residuals(path)
         sizes = residuals.torque_share, residuals.node_error
-        if result.why is not Reason.STATIONARY or within(
-            residuals, TORQUE_TOLERANCE, NODE_TOLERANCE
-        ):
+        if result.why is not Reason.STATIONARY or are_met(residuals):
             break
         slow = [
             size > max(SLOW_DECREASE * before, 0.1 * met)
@@ -126,7 +100,7 @@ def minimize_constrained(
         reason = unmet_sentence(problem, path, residuals)
     elif result.why is Reason.STATIONARY:
         reason = spurious_sentence(problem, path)
-    return ConstrainedResult(result, multipliers, residuals, reason)
+    return result, multipliers, reason
 
 
 def first_multipliers(problem: TrajectoryProblem, path: DiscretePath) -> Multipliers:
@@ -144,6 +118,11 @@ def mean_output_weight(problem: TrajectoryProblem) -> float:
     weights = np.delete(problem.ld.lagrangian.output_weight, problem.passive)
     weights = weights[weights > 0]
     return float(weights.mean()) if len(weights) > 0 else 1.0
+
+
+def are_met(residuals: Residuals) -> bool:
+    """Whether the constraints hold to their tolerances."""
+    return within(residuals, TORQUE_TOLERANCE, NODE_TOLERANCE)
 
 
 def within(residuals: Residuals, torque_share: float, node_error: float) -> bool:

@@ -17,7 +17,8 @@ from hovi.discrete.grid import DiscretePath
 from hovi.errors import InputError
 from hovi.optimize.banded_model import BandModel
 from hovi.optimize.barrier import Bounds
-from hovi.optimize.bounded_objective import BoundedObjective, Outputs, Refinement
+from hovi.optimize.bounded_objective import BoundedObjective, Refinement
+from hovi.optimize.ended import Outputs
 from hovi.optimize.quadratic_model import QuadraticModel
 from hovi.planning.problem.limits import Limits, limited_columns
 from hovi.planning.problem.problem import TrajectoryProblem

@@ -16,6 +16,7 @@ from hovi.discrete.contraction import Expansion
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import DiscretePath
 from hovi.optimize.constrained_model import ConstrainedModel, ConstraintRows, EqualityObjective
+from hovi.optimize.ended import Outputs
 from hovi.optimize.quadratic_model import IntervalSum
 from hovi.planning.conditions.condition import bend_at, linear_at
 from hovi.planning.problem.problem import TrajectoryProblem
@@ -64,14 +65,14 @@ class ConstrainedAction(EqualityObjective[DiscretePath]):
         largest = float(np.max(np.abs(expansion.hessian)))
         return max(INITIAL_NODE_PENALTY * cost, largest, 1e-6)
 
-    def evaluate(self, x: DiscretePath) -> tuple[float, Array]:
+    def evaluate(self, x: DiscretePath) -> Outputs:
         """The action, and c."""
         outputs = self.action.outputs(x)
         parts = [self.node_scale * c for c in node_residuals(self.problem, x)]
         if self.moments is not None:
             scaled = self.moments.scaled
             parts = [*(scaled(tau, i) for i, tau in enumerate(outputs)), *parts]
-        return self.action.value_of(x, outputs), np.concatenate(parts)
+        return Outputs(self.action.value_of(x, outputs), np.concatenate(parts))
 
     def feasible(self, x: DiscretePath) -> bool:
         """Whether passive torques and conditions at nodes are within their tolerances."""

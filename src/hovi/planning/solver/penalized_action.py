@@ -12,13 +12,12 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.discrete.grid import DiscretePath
-from hovi.optimize.bounded_objective import Outputs
 from hovi.optimize.criteria import Criteria
-from hovi.optimize.ended import Reason
+from hovi.optimize.ended import Ended, Outputs, Reason
 from hovi.optimize.quadratic_model import QuadraticModel
+from hovi.optimize.start import Start
 from hovi.optimize.trust_region import Objective, minimize
 from hovi.planning.solver.bounded_action import BoundedAction
-from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 
@@ -52,6 +51,16 @@ class PenalizedAction(Objective[DiscretePath]):
         """Sum weights (distance outside the bounds)^2."""
         return float(np.sum(self.limited.bounds.weights * self._outside(x) ** 2))
 
+    def action(self, x: DiscretePath) -> float:
+        """The action alone."""
+        return self._outputs(x).value
+
+    def is_least(self, ended: Ended[DiscretePath, None]) -> bool:
+        """Whether a violation is near a minimum, which is not zero."""
+        action = ended.value - 0.5 * self.penalty * self.squares(ended.x)
+        slow = ended.why in (Reason.STALLED, Reason.STATIONARY)
+        return slow and action <= OUTWEIGHED * ended.value
+
     def model(
         self, x: DiscretePath, previous: QuadraticModel | None, step: Array | None
     ) -> QuadraticModel:
@@ -78,36 +87,13 @@ class PenalizedAction(Objective[DiscretePath]):
         return np.asarray(np.maximum(y - bounds.upper, 0) - np.maximum(bounds.lower - y, 0))
 
 
-@dataclass(frozen=True, eq=False)
-class LeastViolation:
-    """A motion near one of least violation, and how it was found.
-
-    path, value: the motion and its action. violation: the largest, as a share of its range.
-    squares: sum weights (distance outside)^2. steps, stop: how many, and why they ended.
-    least: whether the violation is near a minimum, which is not zero.
-    """
-
-    path: DiscretePath
-    value: float
-    violation: float
-    squares: float
-    least: bool
-    steps: int
-    why: Reason
-
-
 def least_violation(
-    limited: BoundedAction, path: DiscretePath, density: float, criteria: Criteria
-) -> LeastViolation:
+    penalized: PenalizedAction, path: DiscretePath, criteria: Criteria
+) -> Ended[DiscretePath, None]:
     """Minimise the violation of limits from a motion, as far as it decreases quickly.
 
-    density: mean density of the action. criteria: for the remaining time.
+    penalized: with LEAST_VIOLATION_PENALTY. criteria: for the remaining time.
     """
-    penalized = PenalizedAction(limited, LEAST_VIOLATION_PENALTY * density)
     steps = min(MAX_STEPS, criteria.max_iterations)
     criteria = dataclasses.replace(criteria, max_iterations=steps, stalled=STALLED)
-    found = minimize(penalized, path, criteria)
-    squares, violation = penalized.squares(found.x), penalized.violation(found.x)
-    action = found.value - 0.5 * penalized.penalty * squares
-    least = found.why in (Reason.STALLED, Reason.STATIONARY) and action <= OUTWEIGHED * found.value
-    return LeastViolation(found.x, action, violation, squares, least, found.iterations, found.why)
+    return minimize(penalized, Start(path), criteria)

@@ -1,15 +1,15 @@
-"""Status of a solve, and the sentence that describes its outcome."""
+"""Status of a solve, and the sentence that describes how it ended."""
 
 from __future__ import annotations
 
 from enum import StrEnum
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from hovi.discrete.grid import DiscretePath
-from hovi.optimize.ended import Reason
-from hovi.optimize.trust_region import Outcome
+from hovi.optimize.ended import Ended, Reason
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.non_finite import non_finite_sentence
 
@@ -17,7 +17,7 @@ Array = npt.NDArray[np.float64]
 
 
 class Status(StrEnum):
-    """Outcome of a solve.
+    """Ended of a solve.
 
     STATIONARY: a stationary point of any index, where one was sought.
     UNRESOLVED: a minimum at the quadrature points, on a grid that cannot carry the motion between
@@ -54,6 +54,7 @@ _UNFINISHED = {
     Reason.TIME_LIMIT: (Status.TIME_LIMIT, "the time limit was reached"),
     Reason.INTERRUPTED: (Status.INTERRUPTED, "the solve was interrupted"),
     Reason.DIVERGED: (Status.DIVERGED, "no step decreases the cost"),
+    Reason.INFEASIBLE: (Status.DIVERGED, "no step decreases the cost"),
 }
 
 
@@ -73,30 +74,33 @@ def diverged(reason: str, steps: int) -> str:
 
 
 def status_of(
-    problem: TrajectoryProblem, outcome: Outcome[DiscretePath], n_neg: int
+    problem: TrajectoryProblem, ended: Ended[DiscretePath, Any], cost: float, nit: int, n_neg: int
 ) -> tuple[Status, str]:
-    """Status and message of an outcome."""
-    if outcome.why is Reason.DIVERGED:
-        reason = non_finite_sentence(problem, outcome.x)
+    """Status and message of a solve.
+
+    cost: with the price of time. nit: number of all its iterations.
+    """
+    if ended.why in (Reason.DIVERGED, Reason.INFEASIBLE):
+        reason = non_finite_sentence(problem, ended.x)
         if reason:
-            return Status.DIVERGED, diverged(reason, outcome.iterations)
+            return Status.DIVERGED, diverged(reason, nit)
     left = "".join(
-        f" A saddle of cost {cost:.10g} was left along negative curvature."
-        for cost in outcome.saddles_left
+        f" A saddle of cost {value:.10g} was left along negative curvature."
+        for value in ended.saddles
     )
-    if outcome.why is Reason.STATIONARY and n_neg == 0:
+    if ended.why is Reason.STATIONARY and n_neg == 0:
         return (
             Status.MINIMUM,
-            f"a minimum of cost {outcome.value:.10g} after {outcome.iterations} steps.{left}",
+            f"a minimum of cost {cost:.10g} after {nit} steps.{left}",
         )
-    if outcome.why is Reason.STATIONARY:
+    if ended.why is Reason.STATIONARY:
         return (
             Status.SADDLE,
-            f"a saddle of cost {outcome.value:.10g} with {n_neg} directions of negative curvature; "
+            f"a saddle of cost {cost:.10g} with {n_neg} directions of negative curvature; "
             "solve again with escape_saddles=True or another guess.",
         )
-    status, reason = unfinished(outcome.why)
+    status, reason = unfinished(ended.why)
     return status, (
-        f"{reason} after {outcome.iterations} steps, before a minimum was found; the motion is the "
-        f"best so far, of cost {outcome.value:.10g}.{left}"
+        f"{reason} after {nit} steps, before a minimum was found; the motion is the "
+        f"best so far, of cost {cost:.10g}.{left}"
     )

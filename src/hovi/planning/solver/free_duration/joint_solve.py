@@ -8,8 +8,9 @@ import numpy as np
 
 from hovi.discrete.grid import DiscretePath
 from hovi.optimize.criteria import Criteria
-from hovi.optimize.ended import Reason
-from hovi.optimize.trust_region import Outcome, minimize
+from hovi.optimize.ended import Ended, Reason
+from hovi.optimize.start import Start
+from hovi.optimize.trust_region import minimize
 from hovi.planning.problem.contradictions import contradiction
 from hovi.planning.problem.limits import Limits
 from hovi.planning.problem.problem import TrajectoryProblem
@@ -100,16 +101,16 @@ def _unlimited(
 ) -> MethodResult:
     """By the trust region."""
     objective = TimedAction(problem, price)
-    outcome = minimize(objective, TimedPath(guess, problem.grid.duration), criteria)
-    n_neg = 0 if outcome.convex else _negative_eigenvalues(objective, outcome)
-    T, path = outcome.x.duration, outcome.x.path
+    ended = minimize(objective, Start(TimedPath(guess, problem.grid.duration)), criteria)
+    n_neg = 0 if ended.convex else _negative_eigenvalues(objective, ended)
+    T, path = ended.x.duration, ended.x.path
     final = problem.on(problem.grid.stretched(T))
-    cost = outcome.value - price.weight * T + price_of_time(final)
-    at_end = Outcome(path, cost, outcome.why, outcome.iterations)
-    status, message = status_of(final, at_end, n_neg)
+    cost = ended.value - price.weight * T + price_of_time(final)
+    nit, at_end = len(ended.steps), Ended(path, ended.outputs, None, ended.why)
+    status, message = status_of(final, at_end, cost, nit, n_neg)
     message += chart_sentence(final, path)
-    nit, history = outcome.iterations, outcome.history
-    return MethodResult(final, final.moved(path), cost, status, message, nit, n_neg, history)
+    moved = final.moved(path)
+    return MethodResult(final, moved, cost, status, message, nit, n_neg, ended.steps)
 
 
 def _limited(
@@ -129,12 +130,12 @@ def _limited(
     return minimum_within_limits(problem, limits, guess, price, criteria)
 
 
-def _negative_eigenvalues(objective: TimedAction, outcome: Outcome[TimedPath]) -> int:
+def _negative_eigenvalues(objective: TimedAction, ended: Ended[TimedPath, None]) -> int:
     """n_neg of the exact bordered Hessian; -1 if the value is not finite, or if time runs out."""
-    if outcome.why is Reason.DIVERGED or not np.isfinite(outcome.value):
+    if ended.why is Reason.DIVERGED or not np.isfinite(ended.value):
         return -1
     try:
-        model = objective.model(outcome.x, None, None)
+        model = objective.model(ended.x, None, None)
         return 0 if model.factor(0.0) is not None else model.negative_eigenvalues()
     except OutOfTimeError:
         return -1

@@ -9,7 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.discrete.grid import DiscretePath
-from hovi.optimize.bounded_objective import BoundedObjective, Outputs, Refinement
+from hovi.optimize.bounded_objective import BoundedObjective, Refinement
+from hovi.optimize.ended import Outputs
 from hovi.optimize.quadratic_model import QuadraticModel
 from hovi.planning.problem.limits import Limits
 from hovi.planning.problem.problem import TrajectoryProblem

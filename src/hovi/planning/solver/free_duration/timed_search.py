@@ -11,15 +11,15 @@ import dataclasses
 from hovi.discrete.grid import DiscretePath
 from hovi.optimize.barrier import Barrier
 from hovi.optimize.bordered_model import BorderedModel
-from hovi.optimize.bounded_objective import STOPPED, BoundedOutcome, Outputs
 from hovi.optimize.criteria import Criteria
-from hovi.optimize.ended import Reason
+from hovi.optimize.ended import STOPPED, Ended, Outputs, Reason
 from hovi.optimize.interior_point import minimize_bounded
+from hovi.optimize.start import Start
 from hovi.planning.problem.limits import Limits
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.free_duration.timed_bounded_action import TimedBoundedAction
 from hovi.planning.solver.free_duration.timed_path import TimedPath, TimePrice, stretched_path
-from hovi.planning.solver.methods.bounded_search import Bounded, BoundedSearch
+from hovi.planning.solver.methods.bounded_search import Begun, Bounded, BoundedSearch
 from hovi.planning.solver.methods.feasibility import solved_from
 from hovi.planning.solver.methods.limits_between_points import tightened, usable
 from hovi.planning.solver.methods.method import MethodResult
@@ -71,30 +71,30 @@ class TimedSearch(BoundedSearch):
     timed = True
     price: TimePrice = dataclasses.field(kw_only=True)
 
-    def solve(self, path: DiscretePath, start: Barrier | None = None) -> Bounded:
+    def solve(self, start: Begun) -> Bounded:
         """Solve with bounds at the quadrature points, from the problem's duration."""
         raise_if_late()
         problem, criteria = self.problem, self.remaining_criteria()
-        criteria = dataclasses.replace(criteria, decrease=LAST_DECREASE)
+        criteria = dataclasses.replace(criteria, decrease=LAST_DECREASE, plain=False)
         objective = TimedBoundedAction(problem, self.limits, self.margins, self.price, self.rows)
-        x = TimedPath(path, problem.grid.duration)
-        found = minimize_bounded(objective, x, criteria, self.report, start)
-        self.iterations += found.iterations
-        self.history += found.history
+        x = TimedPath(start.x, problem.grid.duration)
+        found = minimize_bounded(objective, Start(x, start.z), criteria, self.report)
+        self.iterations += len(found.steps)
+        self.history += found.steps
         self.rows = objective.rows
         self._stretch(found.x.duration)
         self.last = self.problem, found.x.path
-        outcome = self._at_its_duration(found, objective)
+        ended = self._at_its_duration(found, objective)
         self.points = []  # these are of other durations
-        if outcome.why is Reason.STATIONARY and outcome.marks:
-            self._add_points(outcome, objective.at(found.x.duration))
-        return outcome
+        if ended.why is Reason.STATIONARY and ended.saved:
+            self._add_points(ended, objective.at(found.x.duration))
+        return ended
 
     def solve_fixed(self, path: DiscretePath) -> Bounded:
         """Solve for the problem's duration, roughly."""
         criteria = self.remaining_criteria()
         rough = dataclasses.replace(criteria, decrease=ROUGH_DECREASE, barrier=ROUGH_BARRIER)
-        return self.minimized(self.objective(None), path, rough, None)
+        return self.minimized(self.objective(None), Start(path), rough)
 
     def back_to(self, problem: TrajectoryProblem) -> None:
         """See BoundedSearch: to the duration of the problem."""
@@ -109,17 +109,17 @@ class TimedSearch(BoundedSearch):
             self.guess = self.problem.moved(stretched_path(self.guess, duration / before))
 
     def _at_its_duration(
-        self, found: BoundedOutcome[TimedPath], objective: TimedBoundedAction
+        self, found: Ended[TimedPath, Barrier], objective: TimedBoundedAction
     ) -> Bounded:
-        """The outcome for the problem of its duration, whose points weigh more or less."""
-        T, barrier = found.x.duration, found.barrier
+        """The end of a solve for the problem of its duration, whose points weigh more or less."""
+        T, barrier = found.x.duration, found.z
         share, price = objective.share(T), self.price.weight * T
-        marks = [
+        saved = [
             (share * product, self.problem.moved(stretched_path(x.path, T / x.duration)))
-            for product, x in found.marks
+            for product, x in found.saved
             if abs(T / x.duration - 1.0) <= SAME_DURATION
         ]
-        return BoundedOutcome(
+        return Ended(
             found.x.path,
             Outputs(found.outputs.value - price, found.outputs.y),
             dataclasses.replace(
@@ -130,29 +130,28 @@ class TimedSearch(BoundedSearch):
                 mu=share * barrier.mu,
             ),
             found.why,
-            found.iterations,
-            found.history,
+            found.steps,
             found.model,
-            marks=marks,
+            saved=saved,
         )
 
-    def negative_eigenvalues(self, outcome: Bounded) -> int:
+    def negative_eigenvalues(self, ended: Bounded) -> int:
         """n_neg of the condensed system, the duration among its unknowns."""
-        model = outcome.model
-        if outcome.why is not Reason.STATIONARY or not isinstance(model, BorderedModel):
+        model = ended.model
+        if ended.why is not Reason.STATIONARY or not isinstance(model, BorderedModel):
             return -1
         return 0 if model.factor(0.0) is not None else model.negative_eigenvalues()
 
 
 def _searched(search: TimedSearch) -> MethodResult:
     """A minimum at the points, then one within limits everywhere."""
-    outcome = _at_the_points(search)
-    if outcome.why in STOPPED or not usable(outcome):
-        return _ended(search, outcome.why)
-    outcome, reason, _ = tightened(search, outcome)
-    if not reason and outcome.why is not Reason.STATIONARY:
-        return _ended(search, outcome.why)
-    problem, x, n_neg = search.problem, outcome.x, search.negative_eigenvalues(outcome)
+    ended = _at_the_points(search)
+    if ended.why in STOPPED or not usable(ended):
+        return _ended(search, ended.why)
+    ended, reason, _ = tightened(search, ended)
+    if not reason and ended.why is not Reason.STATIONARY:
+        return _ended(search, ended.why)
+    problem, x, n_neg = search.problem, ended.x, search.negative_eigenvalues(ended)
     value, steps = cost_of(problem, x), search.iterations
     held = f"limits hold everywhere, on {problem.grid.intervals} intervals"
     status, what = Status.MINIMUM, f"a minimum of cost {value:.10g} after {steps} steps; {held}"
@@ -161,8 +160,8 @@ def _searched(search: TimedSearch) -> MethodResult:
     elif n_neg != 0:
         curved = f"{n_neg} directions of negative curvature"
         status, what = Status.SADDLE, f"a saddle of cost {value:.10g} with {curved}"
-    instants, forces = search.forces(outcome)
-    central = search.central_path(outcome) if status is Status.MINIMUM else None
+    instants, forces = search.forces(ended)
+    central = search.central_path(ended) if status is Status.MINIMUM else None
     return MethodResult(
         problem,
         x,
@@ -190,10 +189,10 @@ def _at_the_points(search: TimedSearch) -> Bounded:
         if fixed.why in STOPPED:
             return fixed
         if not fixed.feasible:
-            return search.solve(path)
+            return search.solve(Start(path))
         path = fixed.x
     near = solved_from(search, path)
-    return near if usable(near) or near.why in STOPPED else search.solve(search.guess)
+    return near if usable(near) or near.why in STOPPED else search.solve(Start(search.guess))
 
 
 def _ended(search: TimedSearch, why: Reason) -> MethodResult:

@@ -12,14 +12,18 @@ from hovi.discrete.grid import DiscretePath
 from hovi.discrete.guess import stretched, with_bump
 from hovi.errors import ChartError
 from hovi.optimize.barrier import Barrier
-from hovi.optimize.bounded_objective import STOPPED, Outputs
-from hovi.optimize.ended import Reason
+from hovi.optimize.ended import STOPPED, Ended, Outputs, Reason
+from hovi.optimize.start import Start
 from hovi.optimize.trust_region import minimize
 from hovi.planning.solver.augmented_lagrangian_rounds import first_multipliers
 from hovi.planning.solver.bounded_action import BoundedAction
 from hovi.planning.solver.methods.bounded_search import Bounded, BoundedSearch
 from hovi.planning.solver.multipliers import Multipliers
-from hovi.planning.solver.penalized_action import LeastViolation, PenalizedAction, least_violation
+from hovi.planning.solver.penalized_action import (
+    LEAST_VIOLATION_PENALTY,
+    PenalizedAction,
+    least_violation,
+)
 
 PENALTIES = 1.0, 1e2, 1e4, 1e6
 """Penalties of violated limits, relative to the mean density, if the interior point fails."""
@@ -39,64 +43,65 @@ SMALL_VIOLATION = 1e-3
 """Violation, as a share of the range, below which the interior point is tried again."""
 
 
-def locally_infeasible(search: BoundedSearch, outcome: Bounded) -> str:
+def locally_infeasible(search: BoundedSearch, ended: Bounded) -> str:
     """Why no motion is within limits, if their violation has minima that are not zero; else "".
 
     These are looked for from the motion of a failed solve, from the guess and from a perturbed one.
-    If all three find one, and two of them the lowest, that becomes the outcome's motion.
+    If all three find one, and two of them the lowest, that becomes the motion of the failed solve.
     """
     if search.problem.constrained or search.clearance is not None or search.timed:
         return ""
     rows, search.rows = search.rows, search.fine_rows()
     objective = search.objective(None)
-    density = outcome.outputs.density(objective.bounds.measure)
-    found: list[LeastViolation] = []
-    for path in (outcome.x, search.guess, _bumped_guess(search, 0, BUMP_SHARE)):
-        each = least_violation(objective, path, density, search.remaining_criteria())
-        search.iterations += each.steps
+    density = ended.outputs.density(objective.bounds.measure)
+    penalized = PenalizedAction(objective, LEAST_VIOLATION_PENALTY * density)
+    found: list[Ended[DiscretePath, None]] = []
+    for path in (ended.x, search.guess, _bumped_guess(search, 0, BUMP_SHARE)):
+        each = least_violation(penalized, path, search.remaining_criteria())
+        search.iterations += len(each.steps)
         found.append(each)
         if each.why in STOPPED:
-            outcome.why = each.why
-        if not each.least or each.violation <= SMALL_VIOLATION:
+            ended.why = each.why
+        if not penalized.is_least(each) or penalized.violation(each.x) <= SMALL_VIOLATION:
             break
     else:
-        most = SAME_VIOLATION * min(each.squares for each in found)
-        same = [each for each in found if each.squares <= most]
+        most = SAME_VIOLATION * min(penalized.squares(each.x) for each in found)
+        same = [each.x for each in found if penalized.squares(each.x) <= most]
         if len(same) > 1:
-            outcome.x = min(same, key=lambda each: each.value).path
-            outcome.outputs = objective.outputs(outcome.x)
-            outcome.barrier = Barrier.inactive(objective.bounds, outcome.outputs.y)
+            ended.x = min(same, key=penalized.action)
+            ended.outputs = objective.outputs(ended.x)
+            ended.z = Barrier.inactive(objective.bounds, ended.outputs.y)
             search.locally_infeasible = True
-            return search.worst(outcome.x)
+            return search.worst(ended.x)
     search.rows = rows
     return ""
 
 
-def restored_motion(search: BoundedSearch, outcome: Bounded) -> tuple[Bounded, str]:
+def restored_motion(search: BoundedSearch, ended: Bounded) -> tuple[Bounded, str]:
     """Further attempts from motions of small violation; or the reason for infeasibility."""
     constrained = search.problem.constrained
-    known = first_multipliers(search.problem, outcome.x) if constrained else None
+    known = first_multipliers(search.problem, ended.x) if constrained else None
     search.rows = search.coarse_rows()
     objective = search.objective(known)
-    density = outcome.outputs.density(objective.bounds.measure)
+    density = ended.outputs.density(objective.bounds.measure)
     least = np.inf
     bumped = (_bumped_guess(search, seed) for seed in range(BUMPED_GUESSES))
     for guess in chain([search.guess], bumped):
         path, violation, why = _penalized(search, objective, guess, density)
         if why in STOPPED:
-            outcome.why = why
-            return outcome, ""
+            ended.why = why
+            return ended, ""
         if violation <= SMALL_VIOLATION:
             search.multipliers, search.rows = None, search.coarse_rows()
-            again = search.solve(path)
+            again = search.solve(Start(path))
             if again.feasible or again.why in STOPPED:
                 return again, ""
             if violation == 0.0 and why is Reason.STATIONARY:
                 return unlimited_minimum(search, path), ""
         if violation < least:
-            least, outcome.x = violation, path
-    _, outcome.outputs, outcome.barrier = _without_forces(search, known, outcome.x)
-    return outcome, search.worst(outcome.x)
+            least, ended.x = violation, path
+    _, ended.outputs, ended.z = _without_forces(search, known, ended.x)
+    return ended, search.worst(ended.x)
 
 
 def unlimited_minimum(search: BoundedSearch, path: DiscretePath) -> Bounded:
@@ -141,9 +146,9 @@ def _penalized(
     for penalty in PENALTIES:
         penalized = PenalizedAction(objective, penalty * density)
         criteria = dataclasses.replace(search.remaining_criteria(), max_iterations=PENALTY_STEPS)
-        result = minimize(penalized, path, criteria, None)
+        result = minimize(penalized, Start(path), criteria)
         path = result.x
-        search.iterations += result.iterations
+        search.iterations += len(result.steps)
         before, violation = violation, penalized.violation(path)
         if result.why in STOPPED or violation > PENALTY_DECREASE * before:
             break

@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 import dataclasses
+from typing import Any
 
 import numpy as np
 
 from hovi.discrete.grid import DiscretePath
 from hovi.optimize.criteria import Criteria
-from hovi.optimize.ended import Iteration
-from hovi.optimize.trust_region import Outcome, minimize
+from hovi.optimize.ended import Ended, Iteration
+from hovi.optimize.start import Start
+from hovi.optimize.trust_region import minimize
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.augmented_lagrangian_rounds import (
     NODE_TOLERANCE,
     TORQUE_TOLERANCE,
-    ConstrainedResult,
+    are_met,
     minimize_constrained,
     unmet_sentence,
     within,
@@ -51,48 +53,55 @@ class AugmentedLagrangian(Method):
         if problem.unreachable:
             value, message = cost_of(problem, path), f"{problem.unreachable}."
             return MethodResult(problem, path, value, Status.INFEASIBLE, message)
-        rounds, history = _rounds(problem, path, criteria, report)
-        outcome = rounds.result
-        objective = ActionObjective(problem, multipliers=rounds.multipliers)
-        n_neg = negative_eigenvalues(objective, outcome)
-        outcome.value, outcome.iterations = cost_of(problem, outcome.x), len(history)
-        status, message = constrained_status(problem, rounds, n_neg)
+        ended, known, reason, history = _rounds(problem, path, criteria, report)
+        objective = ActionObjective(problem, multipliers=known)
+        n_neg = negative_eigenvalues(objective, ended)
+        nit, cost = len(history), cost_of(problem, ended.x)
+        status, message = constrained_status(problem, ended, reason, cost, nit, n_neg)
         polish = POLISHING_STEPS if status is Status.MINIMUM else 0
-        x, known = _polished(problem, outcome.x, rounds.multipliers, polish)
+        x, known = _polished(problem, ended.x, known, polish)
         value = cost_of(problem, x)
-        nit = len(history)
         return MethodResult(problem, x, value, status, message, nit, n_neg, history, known.forces)
 
 
 def _rounds(
     problem: TrajectoryProblem, path: DiscretePath, criteria: Criteria, report: Report | None
-) -> tuple[ConstrainedResult[Outcome[DiscretePath]], list[Iteration]]:
-    """Rounds until the constraints hold, and the history of all their steps."""
+) -> tuple[Ended[DiscretePath, None], Multipliers, str, list[Iteration]]:
+    """Rounds until the constraints hold: see minimize_constrained; and all their iterations."""
     history: list[Iteration] = []
     deadline = Deadline(criteria.time_limit)
 
     def minimize_round(
         known: Multipliers, x: DiscretePath, decrease: float
-    ) -> Outcome[DiscretePath]:
+    ) -> Ended[DiscretePath, None]:
         objective = ActionObjective(problem, multipliers=known)
         tolerance, left = max(decrease, criteria.decrease), deadline.seconds_left
         chosen = dataclasses.replace(criteria, decrease=tolerance, time_limit=left)
-        outcome = minimize(objective, x, chosen, with_offset(report, len(history)))
-        history.extend(outcome.history)
-        return outcome
+        ended = minimize(objective, Start(x), chosen, with_offset(report, len(history)))
+        history.extend(ended.steps)
+        return ended
 
-    return minimize_constrained(problem, path, minimize_round), history
+    return *minimize_constrained(problem, path, minimize_round), history
 
 
 def constrained_status(
-    problem: TrajectoryProblem, rounds: ConstrainedResult[Outcome[DiscretePath]], n_neg: int
+    problem: TrajectoryProblem,
+    ended: Ended[DiscretePath, Any],
+    reason: str,
+    cost: float,
+    nit: int,
+    n_neg: int,
 ) -> tuple[Status, str]:
-    """Status and message; INFEASIBLE if the constraints cannot be met."""
-    if rounds.reason and np.isfinite(rounds.result.value):
-        return Status.INFEASIBLE, f"{rounds.reason}."
-    status, message = status_of(problem, rounds.result, n_neg)
-    if status is not Status.MINIMUM and not rounds.met:
-        sentence = unmet_sentence(problem, rounds.result.x, rounds.residuals)
+    """Status and message; INFEASIBLE for a reason why the constraints cannot be met.
+
+    Other arguments as of `status_of`.
+    """
+    if reason and np.isfinite(cost):
+        return Status.INFEASIBLE, f"{reason}."
+    status, message = status_of(problem, ended, cost, nit, n_neg)
+    residuals = ActionObjective(problem).residuals(ended.x)
+    if status is not Status.MINIMUM and not are_met(residuals):
+        sentence = unmet_sentence(problem, ended.x, residuals)
         message = f"{message} So far, {sentence.partition(';')[0]}."
     return status, message
 

@@ -13,12 +13,12 @@ from hovi.discrete.instants import Instants
 from hovi.optimize.banded_model import BandModel
 from hovi.optimize.barrier import INITIAL_MARGIN, WARM_START_MARGIN, Barrier
 from hovi.optimize.bordered_model import EquationModel
-from hovi.optimize.bounded_objective import BoundedOutcome
 from hovi.optimize.criteria import Criteria
-from hovi.optimize.ended import Iteration, Reason
+from hovi.optimize.ended import Ended, Iteration, Reason
 from hovi.optimize.interior_point import minimize_bounded
 from hovi.optimize.merge_tree import MergeTreeModel
-from hovi.optimize.nearby_bounded import ROOM, follow_bounded
+from hovi.optimize.nearby_bounded import follow_bounded
+from hovi.optimize.start import Start
 from hovi.planning.clearance.clearance import DISTANCE_SCALE
 from hovi.planning.clearance.clearance_violation import (
     approach_along,
@@ -51,7 +51,8 @@ from hovi.system.dataclass import dataclass
 from hovi.system.deadline import Deadline, raise_if_late
 
 Array = npt.NDArray[np.float64]
-Bounded = BoundedOutcome[DiscretePath]
+Bounded = Ended[DiscretePath, Barrier]
+Begun = Start[DiscretePath, Barrier]
 
 ROUND_BARRIER = 3e-7
 """Least last barrier parameter in rounds of an augmented Lagrangian, relative to the density."""
@@ -79,10 +80,10 @@ class BoundedSearch:
     tightened: the margins before the last tightening and the excess then, if there was one on this
         grid.
     multipliers, unmet: of the constraints, and why they cannot be met, or "".
-    last: the problem and the motion of the last solve. solved: its outcome and its objective.
+    last: the problem and the motion of the last solve. solved: how it ended, and its objective.
     points: of the central path, with a larger barrier than that of the last solution. at_level:
         whether a solve begins on one. timed: whether the duration is free.
-    along, level: see InteriorPoint. plain: see minimize_bounded.
+    along, level: see InteriorPoint.
     locally_infeasible: see MethodResult.
     """
 
@@ -97,7 +98,6 @@ class BoundedSearch:
     unmet: str = ""
     along: CentralPath | None = None
     level: float | None = None
-    plain: bool = False
     lazy: bool = False
     at_level: bool = False
     locally_infeasible: bool = False
@@ -187,26 +187,26 @@ class BoundedSearch:
             self.problem, self.limits, self.margins, algebra, known, self.clearance, self.rows
         )
 
-    def central_path(self, outcome: Bounded) -> CentralPath:
+    def central_path(self, ended: Bounded) -> CentralPath:
         """The points at which the barrier of a solve was larger, and its solution."""
-        density = outcome.outputs.density(self.problem.grid.duration)
-        last = outcome.barrier.mu / density
+        density = ended.outputs.density(self.problem.grid.duration)
+        last = ended.z.mu / density
         before = [(level, x) for level, x in self.points if level > last]
-        points = (*before, (last, outcome.x))
+        points = (*before, (last, ended.x))
         apart = self.problem.distances is None or (self.near is not None and self.near.size == 0)
-        barrier = outcome.barrier if apart else None
+        barrier = ended.z if apart else None
         known = None if len(self.problem.passive) > 0 else self.multipliers
         conditions = None if known is None else tuple(known.nodes)
         return CentralPath(points, self.rows, barrier, self.margins, self.near, conditions)
 
-    def _add_points(self, outcome: Bounded, objective: BoundedAction) -> None:
+    def _add_points(self, ended: Bounded, objective: BoundedAction) -> None:
         """Add the points at which the barrier of a solve was larger to those of earlier solves.
 
         These are on the central path of a similar problem only, perhaps between other ends, but the
         next solve may need room.
         """
-        density = outcome.outputs.density(objective.bounds.measure)
-        points = [(product / density, x) for product, x in outcome.marks]
+        density = ended.outputs.density(objective.bounds.measure)
+        points = [(product / density, x) for product, x in ended.saved]
         first, like = points[0]
         before = [
             (level, x)
@@ -222,142 +222,139 @@ class BoundedSearch:
         """The criteria with the remaining time as time limit."""
         return dataclasses.replace(self.criteria, time_limit=self.deadline.seconds_left)
 
-    def solve(self, path: DiscretePath, start: Barrier | None = None) -> Bounded:
+    def solve(self, start: Begun) -> Bounded:
         """Solve with bounds at the quadrature points; in rounds for passive torques."""
         if not self.problem.constrained:
-            return self.minimized(self.objective(None), path, self.remaining_criteria(), start)
+            return self.minimized(self.objective(None), start, self.remaining_criteria())
         if len(self.problem.passive) == 0:
-            found = self._solved_under_conditions(path, start)
+            found = self._solved_under_conditions(start)
             if found is not None:
                 return found
 
+        z = start.z
+
         def minimize_round(known: Multipliers, x: DiscretePath, decrease: float) -> Bounded:
-            nonlocal start
+            nonlocal z
             objective, criteria = self.objective(known), self.remaining_criteria()
             decrease, mu = max(decrease, criteria.decrease), max(ROUND_BARRIER, criteria.barrier)
             criteria = dataclasses.replace(criteria, decrease=decrease, barrier=mu)
-            outcome = self.minimized(objective, x, criteria, start)
+            ended = self.minimized(objective, Start(x, z), criteria)
             share = float(np.clip(decrease**0.5, ROUND_BARRIER, WARM_MU_RANGE[1]))
-            mu = share * outcome.outputs.density(objective.bounds.measure)
-            y, barrier = outcome.outputs.y, outcome.barrier
-            start = None
+            mu = share * ended.outputs.density(objective.bounds.measure)
+            y, barrier = ended.outputs.y, ended.z
+            z = None
             if len(y) == len(barrier.s) == len(objective.bounds.lower):
-                start = barrier.warm(objective.bounds, y, mu, min(share, WARM_START_MARGIN))
-            return outcome
+                z = barrier.warm(objective.bounds, y, mu, min(share, WARM_START_MARGIN))
+            return ended
 
-        rounds = minimize_constrained(self.problem, path, minimize_round, self.multipliers)
-        self.multipliers, self.unmet = rounds.multipliers, rounds.reason
-        return rounds.result
+        rounds = minimize_constrained(self.problem, start.x, minimize_round, self.multipliers)
+        ended, self.multipliers, self.unmet = rounds
+        return ended
 
     def solve_at_level(self, path: DiscretePath, level: float) -> Bounded:
         """Solve from a point of a central path, or one near it.
 
         level: its barrier parameter, relative to the mean density of the objective.
         """
-        objective = self.objective(self.multipliers)
-        outputs = objective.outputs(path)
-        density = outputs.density(objective.bounds.measure)
-        margin = min(INITIAL_MARGIN, LEVEL_MARGIN * level)
-        start = Barrier.central(objective.bounds, outputs.y, level * density, density, margin)
         self.at_level = True
         try:
-            return self.solve(path, start)
+            return self.solve(self.start_at(path, level, self.objective(self.multipliers), True))
         finally:
             self.at_level = False
 
-    def _solved_under_conditions(self, path: DiscretePath, start: Barrier | None) -> Bounded | None:
+    def start_at(
+        self, path: DiscretePath, level: float, objective: BoundedAction, central: bool = False
+    ) -> Begun:
+        """A start with slacks at the outputs, and multipliers on the central path.
+
+        level: barrier parameter, relative to the mean density of the objective. central: whether
+        the path is near its point of the central path.
+        """
+        outputs = objective.outputs(path)
+        density = outputs.density(objective.bounds.measure)
+        scale, margin = None, INITIAL_MARGIN
+        if central:
+            scale, margin = density, min(INITIAL_MARGIN, LEVEL_MARGIN * level)
+        z = Barrier.central(objective.bounds, outputs.y, level * density, scale, margin)
+        return Start(path, z)
+
+    def _solved_under_conditions(self, start: Begun) -> Bounded | None:
         """A solve whose steps meet the conditions at nodes; None where that fails."""
-        known = self.multipliers or first_multipliers(self.problem, path)
+        known = self.multipliers or first_multipliers(self.problem, start.x)
         objective = self.objective(known, node_tolerance=NODE_TOLERANCE)
-        outcome = self.minimized(objective, path, self.remaining_criteria(), start)
-        met = objective.meets_equations(outcome.x)
-        if outcome.why is Reason.DIVERGED or (outcome.why is Reason.STATIONARY and not met):
+        ended = self.minimized(objective, start, self.remaining_criteria())
+        met = objective.meets_equations(ended.x)
+        if ended.why is Reason.DIVERGED or (ended.why is Reason.STATIONARY and not met):
             return None
         self.multipliers = objective.action.multipliers
-        spurious = outcome.why is Reason.STATIONARY
-        self.unmet = spurious_sentence(self.problem, outcome.x) if spurious else ""
-        return outcome
+        spurious = ended.why is Reason.STATIONARY
+        self.unmet = spurious_sentence(self.problem, ended.x) if spurious else ""
+        return ended
 
-    def minimized(
-        self,
-        objective: BoundedAction,
-        path: DiscretePath,
-        criteria: Criteria,
-        start: Barrier | None = None,
-    ) -> Bounded:
+    def minimized(self, objective: BoundedAction, start: Begun, criteria: Criteria) -> Bounded:
         """One solve of an objective. start: see minimize_bounded."""
         raise_if_late()  # the outputs at the guess alone may take seconds
-        if start is not None and len(start.s) != len(objective.bounds.lower):
-            start = None  # rows were added in a solve that failed
-        outcome = minimize_bounded(objective, path, criteria, self.report, start, self.plain)
-        return self._noted(outcome, objective)
+        if start.z is not None and len(start.z.s) != len(objective.bounds.lower):
+            start = Start(start.x)  # rows were added in a solve that failed
+        return self._noted(minimize_bounded(objective, start, criteria, self.report), objective)
 
-    def followed(
-        self,
-        objective: BoundedAction,
-        path: DiscretePath,
-        known: Barrier,
-        criteria: Criteria,
-        most_outside: float = ROOM,
-    ) -> Bounded:
+    def followed(self, objective: BoundedAction, start: Begun, criteria: Criteria) -> Bounded:
         """A solve of an objective from the solution of a similar problem: see follow_bounded."""
         raise_if_late()
-        known = dataclasses.replace(known, bounds=objective.bounds)
-        outcome = follow_bounded(objective, path, known, criteria, self.report, most_outside)
-        return self._noted(outcome, objective)
+        return self._noted(follow_bounded(objective, start, criteria, self.report), objective)
 
-    def _noted(self, outcome: Bounded, objective: BoundedAction) -> Bounded:
-        """The outcome of a solve, after its steps and its motion were noted."""
-        self.iterations += outcome.iterations
-        self.history += outcome.history
-        self.last, self.solved = (self.problem, outcome.x), (outcome, objective)
-        if outcome.why is Reason.STATIONARY and outcome.marks:
-            self._add_points(outcome, objective)
-        return outcome
+    def _noted(self, ended: Bounded, objective: BoundedAction) -> Bounded:
+        """How a solve ended, after its steps and its motion were noted."""
+        self.iterations += len(ended.steps)
+        self.history += ended.steps
+        self.last, self.solved = (self.problem, ended.x), (ended, objective)
+        if ended.why is Reason.STATIONARY and ended.saved:
+            self._add_points(ended, objective)
+        return ended
 
-    def forces(self, outcome: Bounded) -> tuple[Instants | None, list[PointTerms]]:
+    def forces(self, ended: Bounded) -> tuple[Instants | None, list[PointTerms]]:
         """The instants between the points at which limits act, and all multipliers.
 
         Those of limits and constraints, penalty terms of the constraints included.
         """
-        multipliers, objective = outcome.barrier.multipliers, self._objective_of(outcome)
+        multipliers, objective = ended.z.multipliers, self._objective_of(ended)
         if isinstance(objective, ClearedAction):
             multipliers = objective.plain(multipliers)
         limits = len(multipliers) - (0 if self.near is None else self.near.size)
         rows = multipliers[limits - self.rows.size : limits]
         instants, further = forces_of(self.problem, self.rows, rows)
         if self.near is not None and self.near.size > 0 and self.problem.ld.segments is None:
-            others, more = self.near.forces(outcome.x, multipliers[limits:])
+            others, more = self.near.forces(ended.x, multipliers[limits:])
             instants, further = joined(instants, further, others, more)
-        return instants, self._forces_at_points(outcome) + further
+        return instants, self._forces_at_points(ended) + further
 
-    def _forces_at_points(self, outcome: Bounded) -> list[PointTerms]:
+    def _forces_at_points(self, ended: Bounded) -> list[PointTerms]:
         """Those of limits at the quadrature points and of constraints."""
         known = self.multipliers
         if known is not None:
             action = self.objective(known).action
-            known = known.updated(action.residuals(outcome.x), self.problem.passive)
-            return self.objective(known).forces(outcome.x, outcome.barrier.multipliers)
-        return self._objective_of(outcome).forces(outcome.x, outcome.barrier.multipliers)
+            known = known.updated(action.residuals(ended.x), self.problem.passive)
+            return self.objective(known).forces(ended.x, ended.z.multipliers)
+        return self._objective_of(ended).forces(ended.x, ended.z.multipliers)
 
-    def _objective_of(self, outcome: Bounded) -> BoundedAction:
+    def _objective_of(self, ended: Bounded) -> BoundedAction:
         """The objective of a solve without multipliers of constraints."""
         last, objective = self.solved or (None, None)
-        if objective is None or last is not outcome or self.near is not None:
+        if objective is None or last is not ended or self.near is not None:
             return self.objective(None)
         return self.objective(None) if objective.action.multipliers is not None else objective
 
-    def negative_eigenvalues(self, outcome: Bounded) -> int:
+    def negative_eigenvalues(self, ended: Bounded) -> int:
         """n_neg of the condensed system, which is positive definite at a minimum."""
-        if outcome.why is not Reason.STATIONARY or outcome.model is None:
+        if ended.why is not Reason.STATIONARY or ended.model is None:
             return -1
-        if outcome.model.factor(0.0) is not None:
+        if ended.model.factor(0.0) is not None:
             return 0
         mergeable = self.problem.plain and self.problem.ld.k == 2
-        if not mergeable and isinstance(outcome.model, BandModel | EquationModel):
-            return outcome.model.negative_eigenvalues()
+        if not mergeable and isinstance(ended.model, BandModel | EquationModel):
+            return ended.model.negative_eigenvalues()
         objective = self.objective(None, "tree")
-        model = objective.model(outcome.x, *outcome.barrier.condensed(outcome.outputs.y))
+        model = objective.model(ended.x, *ended.z.condensed(ended.outputs.y))
         return model.negative_eigenvalues() if isinstance(model, MergeTreeModel) else -1
 
     def excess(self, path: DiscretePath) -> Array:

@@ -8,9 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from hovi.discrete.grid import DiscretePath
-from hovi.optimize.barrier import Barrier
-from hovi.optimize.bounded_objective import STOPPED
-from hovi.optimize.ended import Reason
+from hovi.optimize.ended import STOPPED, Reason
+from hovi.optimize.start import Start
 from hovi.planning.problem.limits import no_limits
 from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.augmented_lagrangian_rounds import (
@@ -76,12 +75,12 @@ def cleared_motion(search: BoundedSearch, guess: DiscretePath) -> Bounded:
     if rough[0] is None or rough[0].rank > (False, DETOUR * abs(free.outputs.value)):
         steps = ROUGH_STEPS
         if rough[0] is not None:
-            steps = max(SECOND_STEPS * rough[0].outcome.iterations, LEAST_SECOND_STEPS)
+            steps = max(SECOND_STEPS * len(rough[0].ended.steps), LEAST_SECOND_STEPS)
         rough.append(_rough_with_distances(search, guess, min(steps, ROUGH_STEPS)))
     for found in sorted(filter(None, rough), key=lambda each: each.rank):
-        outcome = found.solved(search)
-        if outcome.why is not Reason.DIVERGED:
-            return outcome
+        ended = found.solved(search)
+        if ended.why is not Reason.DIVERGED:
+            return ended
     raise_if_late()  # or more time might lead to one
     return dataclasses.replace(free, why=Reason.DIVERGED)
 
@@ -93,18 +92,18 @@ def _by_legs(search: BoundedSearch, guess: DiscretePath) -> Bounded | None:
     known = list[CentralPath]()
     for leg in legs:
         part = _search_of(leg, search, guess)
-        outcome = cleared_motion(part, part.guess)
+        ended = cleared_motion(part, part.guess)
         search.iterations += part.iterations
         search.history += part.history
-        if not outcome.converged:
+        if not ended.converged:
             return None
         parts.append(part)
-        known.append(part.central_path(outcome))
+        known.append(part.central_path(ended))
     for level in LEG_LEVELS if legs else ():
         path = joined(legs, [each.at(level)[1] for each in known])
-        outcome = _from_legs(search, legs, parts, path, level)
-        if outcome.settled:
-            return outcome
+        ended = _from_legs(search, legs, parts, path, level)
+        if ended.settled:
+            return ended
     return None
 
 
@@ -136,13 +135,13 @@ def _without_distances(search: BoundedSearch, guess: DiscretePath) -> Bounded:
     assert near is not None
     near.probing = True
     if not search.problem.constrained:
-        return search.solve(guess)
+        return search.solve(Start(guess))
 
     search.near = None
     rough = _rough_with_constraints(search, guess)
     search.near = near
     near.extend(search.problem, rough.x, AHEAD)
-    return rough if near.blocked or rough.why in STOPPED else search.solve(rough.x)
+    return rough if near.blocked or rough.why in STOPPED else search.solve(Start(rough.x))
 
 
 def _rough_with_constraints(search: BoundedSearch, guess: DiscretePath) -> Bounded:
@@ -154,14 +153,14 @@ def _rough_with_constraints(search: BoundedSearch, guess: DiscretePath) -> Bound
 
     if len(problem.passive) == 0:
         return _rough(search, guess, first_multipliers(problem, guess), None)[0]
-    return minimize_constrained(problem, guess, minimize_round, most=ROUGH_ROUNDS).result
+    return minimize_constrained(problem, guess, minimize_round, most=ROUGH_ROUNDS)[0]
 
 
 @dataclass(frozen=True, eq=False)
 class _Rough:
     """A rough motion with distances, its rows, and multipliers of constraints, if there are any."""
 
-    outcome: Bounded
+    ended: Bounded
     multipliers: Multipliers | None
     rows: LimitRows
     near: ClearanceRows
@@ -169,18 +168,18 @@ class _Rough:
     @property
     def rank(self) -> tuple[bool, float]:
         """Whether it does not keep its bounds yet, and the action."""
-        return not self.outcome.feasible, self.outcome.outputs.value
+        return not self.ended.feasible, self.ended.outputs.value
 
     def solved(self, search: BoundedSearch) -> Bounded:
         """The solve from there to the end, with rows of pairs that are near."""
-        x, barrier = self.outcome.x, self.outcome.barrier
+        x, barrier = self.ended.x, self.ended.z
         near, kept = self.near.thinned(x, KEPT)
         points = len(barrier.s) - len(self.near.order)
         search.rows, search.near = self.rows, near
         search.multipliers = self.multipliers
-        if self.outcome.why in STOPPED:
-            return search.solve(x)
-        return search.solve(x, barrier.of(np.append(np.arange(points), points + kept)))
+        if self.ended.why in STOPPED:
+            return search.solve(Start(x))
+        return search.solve(Start(x, barrier.of(np.append(np.arange(points), points + kept))))
 
 
 def _rough_with_distances(
@@ -199,14 +198,14 @@ def _rough_with_distances(
     search.near.extend(problem, moved, AHEAD)
     search.near.watchful = True
     known = first_multipliers(problem, moved) if problem.constrained else None
-    outcome, known = _rough(search, moved, known, FIRST_MU, most)
-    violation = outcome.violation
-    if outcome.why is Reason.DIVERGED or violation > ROUGH_VIOLATION:
+    ended, known = _rough(search, moved, known, FIRST_MU, most)
+    violation = ended.violation
+    if ended.why is Reason.DIVERGED or violation > ROUGH_VIOLATION:
         return None
     if known is not None and len(problem.passive) > 0:
-        residuals = ActionObjective(problem, multipliers=known).residuals(outcome.x)
+        residuals = ActionObjective(problem, multipliers=known).residuals(ended.x)
         known = known.updated(residuals, problem.passive)
-    return _Rough(outcome, known, search.rows, search.near)
+    return _Rough(ended, known, search.rows, search.near)
 
 
 def _rough(
@@ -229,9 +228,6 @@ def _rough(
         max_iterations=min(most, whole.max_iterations),
     )
     tolerance = None if known is None or len(search.problem.passive) > 0 else ROUGH_TOLERANCE
-    objective, start = search.objective(known, node_tolerance=tolerance), None
-    if mu is not None:
-        outputs = objective.outputs(path)
-        density = outputs.density(objective.bounds.measure)
-        start = Barrier.central(objective.bounds, outputs.y, mu * density)
-    return search.minimized(objective, path, criteria, start), objective.action.multipliers
+    objective = search.objective(known, node_tolerance=tolerance)
+    start = Start(path) if mu is None else search.start_at(path, mu, objective)
+    return search.minimized(objective, start, criteria), objective.action.multipliers

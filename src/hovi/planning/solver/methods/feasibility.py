@@ -8,10 +8,9 @@ import numpy as np
 
 from hovi.discrete.grid import DiscretePath
 from hovi.optimize.barrier import Barrier
-from hovi.optimize.bounded_objective import STOPPED
-from hovi.optimize.criteria import Criteria
-from hovi.optimize.ended import Reason
-from hovi.optimize.nearby_bounded import ROOM
+from hovi.optimize.criteria import ROOM, Criteria
+from hovi.optimize.ended import STOPPED, Reason
+from hovi.optimize.start import Start
 from hovi.optimize.trust_region import minimize
 from hovi.planning.clearance.clearance_violation import approach_along
 from hovi.planning.problem.limits import no_limits
@@ -54,26 +53,27 @@ WARM_STEPS = 100
 
 def feasible_motion(search: BoundedSearch) -> tuple[Bounded, str]:
     """A motion from the guess within bounds at points and control points, or why there is none."""
-    path, outcome = search.guess, None
+    path, ended = search.guess, None
     if search.clearance is not None:
-        outcome = _solved_beside_obstacles(search, path, search.clearance)
-        if outcome is None:
+        ended = _solved_beside_obstacles(search, path, search.clearance)
+        if ended is None:
             path = _moved_out_of_obstacles(search, path, search.clearance)
     moved = None if path is search.guess else path
-    outcome = outcome or _solved_nearby(search, path) or _solved_at_all(search, moved)
+    ended = ended or _solved_nearby(search, path) or _solved_at_all(search, moved)
     if search.near is not None:
-        failed = outcome.why is Reason.DIVERGED and not outcome.feasible
-        return outcome, search.worst(outcome.x) if failed else ""
-    if outcome.why is Reason.DIVERGED and not outcome.feasible:
-        reason = locally_infeasible(search, outcome)
-        if reason or outcome.why in STOPPED:
-            return outcome, reason
-    if outcome.why is Reason.DIVERGED and outcome.corrected:
-        search.plain, search.rows = True, search.fine_rows()
-        outcome = search.solve(_known(search, moved))
-    if outcome.feasible or outcome.why is not Reason.DIVERGED:
-        return outcome, ""
-    return restored_motion(search, outcome)
+        failed = ended.why is Reason.DIVERGED and not ended.feasible
+        return ended, search.worst(ended.x) if failed else ""
+    if ended.why is Reason.DIVERGED and not ended.feasible:
+        reason = locally_infeasible(search, ended)
+        if reason or ended.why in STOPPED:
+            return ended, reason
+    if ended.why is Reason.DIVERGED and ended.corrected:
+        search.criteria = dataclasses.replace(search.criteria, plain=True)
+        search.rows = search.fine_rows()
+        ended = search.solve(Start(_known(search, moved)))
+    if ended.feasible or ended.why is not Reason.DIVERGED:
+        return ended, ""
+    return restored_motion(search, ended)
 
 
 def _solved_nearby(search: BoundedSearch, path: DiscretePath) -> Bounded | None:
@@ -86,20 +86,20 @@ def _solved_nearby(search: BoundedSearch, path: DiscretePath) -> Bounded | None:
     if search.near is None:  # beyond, a solve from the guess is shorter
         most = min(WARM_STEPS, most)
     search.criteria = dataclasses.replace(whole, max_iterations=most)
-    outcome = solved_from(search, path) if along is None else _solved_along(search, along)
-    if along is not None and along.rows is None and not outcome.settled:
+    ended = solved_from(search, path) if along is None else _solved_along(search, along)
+    if along is not None and along.rows is None and not ended.settled:
         search.rows, search.multipliers = search.coarse_rows(), None
         search.near = None if search.near is None else search.no_near_rows()
-        outcome = solved_from(search, path)
+        ended = solved_from(search, path)
     search.criteria = whole
-    left = whole.max_iterations - outcome.iterations
-    closer = outcome.feasible and outcome.why is Reason.ITERATION_LIMIT  # than a guess
+    left = whole.max_iterations - len(ended.steps)
+    closer = ended.feasible and ended.why is Reason.ITERATION_LIMIT  # than a guess
     if not closer or left <= 0:
-        return outcome if outcome.settled else None
+        return ended if ended.settled else None
     search.criteria = dataclasses.replace(whole, max_iterations=left)
-    outcome = search.solve(outcome.x, outcome.barrier)
+    ended = search.solve(Start(ended.x, ended.z))
     search.criteria = whole
-    return None if outcome.why is Reason.DIVERGED else outcome
+    return None if ended.why is Reason.DIVERGED else ended
 
 
 def _known(search: BoundedSearch, moved: DiscretePath | None) -> DiscretePath:
@@ -112,7 +112,7 @@ def _solved_at_all(search: BoundedSearch, moved: DiscretePath | None) -> Bounded
     if search.near is not None:
         search.near = search.no_near_rows()
         return cleared_motion(search, path)
-    return search.solve(path)
+    return search.solve(Start(path))
 
 
 def _solved_along(search: BoundedSearch, along: CentralPath) -> Bounded:
@@ -120,17 +120,17 @@ def _solved_along(search: BoundedSearch, along: CentralPath) -> Bounded:
     _adopt(search, along)
     level = search.level
     if level is None:
-        outcome = _followed(search, along)
-        if outcome is not None:
-            return outcome
+        ended = _followed(search, along)
+        if ended is not None:
+            return ended
         objective, moved = search.objective(search.multipliers), search.problem.moved(along.last)
         change = objective.outputs(moved).y - objective.outputs(along.last).y
         shift = float(np.max(np.abs(change), initial=0.0))
         level = float(np.clip(SHIFT_LEVEL * shift, *SHIFT_LEVELS))
         if along.barrier is not None and shift <= WARM_SHIFT:
-            outcome = _solved_warm(search, along.barrier, moved)
-            if outcome.settled:
-                return outcome
+            ended = _solved_warm(search, along.barrier, moved)
+            if ended.settled:
+                return ended
             _adopt(search, along)
     return _solved_from_level(search, along, level)
 
@@ -161,10 +161,10 @@ def follow(problem: TrajectoryProblem, along: CentralPath, barrier: float) -> Ce
         problem, limits, Criteria(barrier=barrier), None, along.last, along=along
     )
     _adopt(search, along)
-    outcome = _followed(search, along, COMPARED)
-    if outcome is None or outcome.why is not Reason.STATIONARY:
+    ended = _followed(search, along, COMPARED)
+    if ended is None or ended.why is not Reason.STATIONARY:
         return None
-    return search.central_path(outcome)
+    return search.central_path(ended)
 
 
 def _followed(
@@ -186,11 +186,13 @@ def _followed(
         search.remaining_criteria(),
         barrier=max(search.criteria.barrier, WARM_BARRIER),
         enough=enough[0],
+        outside=enough[1],
         max_iterations=min(NEWTON_STEPS, search.criteria.max_iterations),
     )
-    outcome = search.followed(objective, moved, known, criteria, enough[1])
-    if outcome.why is Reason.STATIONARY or outcome.why in STOPPED:
-        return outcome
+    start = Start(moved, dataclasses.replace(known, bounds=objective.bounds))
+    ended = search.followed(objective, start, criteria)
+    if ended.why is Reason.STATIONARY or ended.why in STOPPED:
+        return ended
     _adopt(search, along)
     return None
 
@@ -210,13 +212,13 @@ def _solved_warm(search: BoundedSearch, known: Barrier, path: DiscretePath) -> B
     )
     objective = search.objective(search.multipliers)
     outputs = objective.outputs(path)
-    start = None
+    z = None
     if len(known.s) == len(outputs.y):
         mu *= outputs.density(objective.bounds.measure)
-        start = known.warm(objective.bounds, outputs.y, mu, WARM_MARGIN)
-    outcome = search.solve(path, start)
+        z = known.warm(objective.bounds, outputs.y, mu, WARM_MARGIN)
+    ended = search.solve(Start(path, z))
     search.criteria = whole
-    return outcome
+    return ended
 
 
 def _solved_from_level(search: BoundedSearch, along: CentralPath, level: float) -> Bounded:
@@ -233,10 +235,7 @@ def _solved_from_level(search: BoundedSearch, along: CentralPath, level: float) 
 def solved_from(search: BoundedSearch, path: DiscretePath) -> Bounded:
     """Solve from a motion that nearly is a solution, with a small barrier from the beginning."""
     search.look_around(path)
-    objective = search.objective(search.multipliers)
-    outputs = objective.outputs(path)
-    mu = NEARBY_MU * outputs.density(objective.bounds.measure)
-    return search.solve(path, Barrier.central(objective.bounds, outputs.y, mu))
+    return search.solve(search.start_at(path, NEARBY_MU, search.objective(search.multipliers)))
 
 
 def _solved_beside_obstacles(
@@ -246,8 +245,8 @@ def _solved_beside_obstacles(
     given = approach_along(search.problem.trajectory(path), wanted.distances, wanted.least)
     if float(given.distance.min()) < wanted.least:
         return None
-    outcome = solved_from(search, path)
-    return outcome if outcome.settled else None
+    ended = solved_from(search, path)
+    return ended if ended.settled else None
 
 
 def _moved_out_of_obstacles(
@@ -266,9 +265,9 @@ def _moved_out_of_obstacles(
     for share in np.arange(1, stages) / stages:
         least = wanted.least - (1.0 - share) * depth
         search.clearance = ClearanceOutputs(wanted.distances, least)
-        outcome = search.solve(path)
-        path = outcome.x
-        if outcome.why in STOPPED:
+        ended = search.solve(Start(path))
+        path = ended.x
+        if ended.why in STOPPED:
             break
     search.criteria, search.clearance = criteria, wanted
     return path
@@ -277,11 +276,11 @@ def _moved_out_of_obstacles(
 def _without_obstacles(search: BoundedSearch, path: DiscretePath) -> DiscretePath:
     """The motion without obstacles, or the guess if none is found."""
     if search.limits.bounded.any():
-        outcome = search.solve(path)
-        return outcome.x if outcome.feasible else path
+        ended = search.solve(Start(path))
+        return ended.x if ended.feasible else path
     if search.problem.constrained:
         return path
     objective, criteria = ActionObjective(search.problem), search.remaining_criteria()
-    result = minimize(objective, path, criteria, search.report)
-    search.iterations += result.iterations
+    result = minimize(objective, Start(path), criteria, search.report)
+    search.iterations += len(result.steps)
     return result.x if np.isfinite(result.value) else path

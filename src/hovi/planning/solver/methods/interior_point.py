@@ -9,9 +9,8 @@ from typing import Literal
 import numpy as np
 
 from hovi.discrete.grid import DiscretePath
-from hovi.optimize.bounded_objective import STOPPED
 from hovi.optimize.criteria import Criteria
-from hovi.optimize.ended import Reason
+from hovi.optimize.ended import STOPPED, Reason
 from hovi.planning.problem.contradictions import contradiction
 from hovi.planning.problem.limits import no_limits
 from hovi.planning.problem.problem import TrajectoryProblem
@@ -146,32 +145,32 @@ class InteriorPoint(Method):
 
 def _searched(search: BoundedSearch) -> MethodResult:
     """Run all stages."""
-    outcome, reason = feasible_motion(search)
+    ended, reason = feasible_motion(search)
     reason, excess = reason or search.unmet, 0.0
-    if not reason and usable(outcome) and not search.rows.fixed:
-        outcome, reason, excess = tightened(search, outcome)
+    if not reason and usable(ended) and not search.rows.fixed:
+        ended, reason, excess = tightened(search, ended)
         reason = reason or search.unmet
-        if not reason and outcome.why is Reason.STATIONARY:  # others may just lack rows yet
-            reason = search.too_close(outcome.x)
-    problem, x, n_neg = search.problem, outcome.x, search.negative_eigenvalues(outcome)
+        if not reason and ended.why is Reason.STATIONARY:  # others may just lack rows yet
+            reason = search.too_close(ended.x)
+    problem, x, n_neg = search.problem, ended.x, search.negative_eigenvalues(ended)
     value, nit = cost_of(problem, x), search.iterations
-    broken = "" if outcome.why in STOPPED else _non_finite(search, x, value, excess)
+    broken = "" if ended.why in STOPPED else _non_finite(search, x, value, excess)
     if broken:  # by an effect, not by the limits
         status, message = Status.DIVERGED, diverged(broken, nit)
     elif reason:
         status, message = Status.INFEASIBLE, infeasible_sentence(reason)
-    elif outcome.why is not Reason.STATIONARY:
-        status, message = _unfinished(outcome.why, nit, value)
+    elif ended.why is not Reason.STATIONARY:
+        status, message = _unfinished(ended.why, nit, value)
     elif n_neg == 0:
         status, message = Status.MINIMUM, _minimum(search, value, excess)
     else:
         status, message = Status.SADDLE, _saddle(value, n_neg)
     instants, forces = None, None
-    if outcome.why not in (Reason.TIME_LIMIT, Reason.DIVERGED):  # or rows may be of a later attempt
-        instants, forces = search.forces(outcome)
+    if ended.why not in (Reason.TIME_LIMIT, Reason.DIVERGED):  # or rows may be of a later attempt
+        instants, forces = search.forces(ended)
     history, central = search.history, None
     if status is Status.MINIMUM:
-        central = search.central_path(outcome)
+        central = search.central_path(ended)
     result = MethodResult(problem, x, value, status, message, nit, n_neg, history, forces, instants)
     locally = status is Status.INFEASIBLE and search.locally_infeasible
     return dataclasses.replace(result, central=central, locally_infeasible=locally)

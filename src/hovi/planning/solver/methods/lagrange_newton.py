@@ -10,16 +10,16 @@ import numpy.typing as npt
 
 from hovi.discrete.grid import DiscretePath
 from hovi.optimize.criteria import Criteria
-from hovi.optimize.ended import Iteration, Reason
-from hovi.optimize.lagrange_newton import ConstrainedOutcome, minimize_under_equations
-from hovi.optimize.trust_region import Outcome, minimize
+from hovi.optimize.ended import Ended, Iteration, Reason
+from hovi.optimize.lagrange_newton import minimize_under_equations
+from hovi.optimize.start import Start
+from hovi.optimize.trust_region import minimize
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.augmented_lagrangian_rounds import (
     FEASIBLE_RESIDUAL,
     FIRST_DECREASE,
     WARM_TORQUE_SHARE,
-    ConstrainedResult,
     first_multipliers,
     spurious_sentence,
     unmet_sentence,
@@ -110,15 +110,18 @@ class _Search:
             multipliers = self._known(path, objective)
         if multipliers is None and len(problem.passive) == 0:
             first, multipliers = self._first_round(path, objective)
-            path, saddles = first.x, first.saddles_left
+            path, saddles = first.x, first.saddles
+            if first.why is Reason.DIVERGED:
+                return None
             if first.why is not Reason.STATIONARY:
-                return None if first.why is Reason.DIVERGED else self._result(objective, first, -1)
-        found = minimize_under_equations(
-            objective, path, objective.penalty, self.left, multipliers, self.report
-        )
-        self.history += found.history
-        found.saddles_left = saddles + found.saddles_left
-        if found.why is Reason.DIVERGED and not found.stuck:
+                there = objective.evaluate(path)
+                early = Ended(path, there, np.zeros_like(there.y), first.why, saddles=saddles)
+                return self._result(objective, early, -1)
+        start = Start(path, multipliers)
+        found = minimize_under_equations(objective, start, self.left, self.report)
+        self.history += found.steps
+        found.saddles = saddles + found.saddles
+        if found.why is Reason.DIVERGED:
             return None
         return self._result(objective, found, _negative_eigenvalues(objective, found))
 
@@ -129,75 +132,59 @@ class _Search:
         """
         if objective.action.residuals(path).torque_share > WARM_TORQUE_SHARE:
             return None
-        value, c = objective.evaluate(path)
-        multipliers = objective.model(path, np.zeros_like(c)).least_squares_multipliers()
+        there = objective.evaluate(path)
+        model = objective.model(path, np.zeros_like(there.y))
+        multipliers = model.least_squares_multipliers()
         if len(self.problem.passive) > 0:
             return multipliers
         model = objective.model(path, multipliers)
         factor = model.factor(objective.penalty, 0.0)
         if factor is None:
             return None
-        step, _ = model.solve(factor, objective.penalty, c, NEAR_ACCURACY)
+        step, _ = model.solve(factor, objective.penalty, there.y, NEAR_ACCURACY)
         decrease = 0.5 * abs(float(step @ model.hessian_product(step)))
-        return multipliers if decrease <= FIRST_DECREASE * abs(value) else None
+        return multipliers if decrease <= FIRST_DECREASE * abs(there.value) else None
 
     def _first_round(
         self, path: DiscretePath, objective: ConstrainedAction
-    ) -> tuple[Outcome[DiscretePath], Array]:
+    ) -> tuple[Ended[DiscretePath, None], Array]:
         """A motion near a minimum, where equations at nodes hold nearly, and its multipliers."""
         known = dataclasses.replace(
             first_multipliers(self.problem, path), node_penalty=objective.node_penalty
         )
         penalized = ActionObjective(self.problem, multipliers=known)
         criteria = dataclasses.replace(self.left, decrease=FIRST_DECREASE)
-        outcome = minimize(penalized, path, criteria, self.report)
-        self.history += outcome.history
-        updated = known.updated(penalized.residuals(outcome.x), self.problem.passive)
-        return outcome, objective.of_nodes(updated)
+        ended = minimize(penalized, Start(path), criteria, self.report)
+        self.history += ended.steps
+        updated = known.updated(penalized.residuals(ended.x), self.problem.passive)
+        return ended, objective.of_nodes(updated)
 
     def _result(
-        self, objective: ConstrainedAction, found: Outcome[DiscretePath], n_neg: int
+        self, objective: ConstrainedAction, found: Ended[DiscretePath, Array], n_neg: int
     ) -> MethodResult:
-        """The result of an outcome, whether it is a minimum or not."""
-        problem, x = self.problem, found.x
-        if isinstance(found, ConstrainedOutcome):
-            known = objective.multipliers(found.multipliers)
-        else:
-            known = objective.multipliers(np.zeros(len(objective.evaluate(x)[1])))
+        """The result of a solve, whether it ended in a minimum or not."""
+        problem, x, nit = self.problem, found.x, len(self.history)
+        known = objective.multipliers(found.z)
         residuals = objective.action.residuals(x)
-        found.iterations = len(self.history)
-        if not isinstance(found, ConstrainedOutcome):
-            found.value = problem.ld.action(x)
-        found.value += price_of_time(problem)
+        cost = found.value + price_of_time(problem)
         met = within(residuals, FEASIBLE_RESIDUAL, FEASIBLE_RESIDUAL)
-        ended = found.why is Reason.STATIONARY or (found.why is Reason.ITERATION_LIMIT and met)
-        reason = spurious_sentence(problem, x) if ended else ""
-        if isinstance(found, ConstrainedOutcome) and found.stuck:
+        done = found.why is Reason.STATIONARY or (found.why is Reason.ITERATION_LIMIT and met)
+        reason = spurious_sentence(problem, x) if done else ""
+        if found.why is Reason.INFEASIBLE:
             reason = unmet_sentence(problem, x, residuals)
-        result = ConstrainedResult(found, known, residuals, reason)
-        status, message = constrained_status(problem, result, n_neg)
+        status, message = constrained_status(problem, found, reason, cost, nit, n_neg)
+        forces, jets = known.forces, objective.action.jets(x)
         return MethodResult(
-            problem,
-            x,
-            found.value,
-            status,
-            message,
-            len(self.history),
-            n_neg,
-            self.history,
-            known.forces,
-            jets=objective.action.jets(x),
+            problem, x, cost, status, message, nit, n_neg, self.history, forces, jets=jets
         )
 
 
-def _negative_eigenvalues(
-    objective: ConstrainedAction, found: ConstrainedOutcome[DiscretePath]
-) -> int:
+def _negative_eigenvalues(objective: ConstrainedAction, found: Ended[DiscretePath, Array]) -> int:
     """n_neg on the tangent space of the equations; -1 if time runs out."""
     if found.convex:
         return 0
     try:
-        model = objective.model(found.x, found.multipliers)
+        model = objective.model(found.x, found.z)
         if model.factor(found.penalty, 0.0) is not None:
             return 0
         counts = [model.negative_eigenvalues(found.penalty * f) for f in PENALTY_FACTORS]

@@ -8,8 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.discrete.guess import stretched
-from hovi.optimize.bounded_objective import STOPPED
-from hovi.optimize.ended import Reason
+from hovi.optimize.ended import STOPPED, Reason
+from hovi.optimize.start import Start
 from hovi.planning.solver.methods.bounded_search import (
     WARM_MU_RANGE,
     Bounded,
@@ -49,15 +49,15 @@ MAX_MARGIN = 0.45
 """Maximum share of its range by which a bound is tightened."""
 
 
-def tightened(search: BoundedSearch, outcome: Bounded) -> tuple[Bounded, str, float]:
+def tightened(search: BoundedSearch, ended: Bounded) -> tuple[Bounded, str, float]:
     """Tighten bounds where the interpolant exceeds them, and solve again, until they hold.
 
-    Returns the last outcome, the reason for infeasibility or "", and the largest excess.
+    Returns how the last solve ended, the reason for infeasibility or "", and the largest excess.
     """
     on_grid, halvings, reason = 0, 0, ""
     tolerance = search.limits.tolerance
     for rounds in range(MAX_ROUNDS + 1):
-        sides = search.excess(outcome.x)
+        sides = search.excess(ended.x)
         excess = float(sides.max())
         if excess <= tolerance or rounds == MAX_ROUNDS:
             break
@@ -65,36 +65,36 @@ def tightened(search: BoundedSearch, outcome: Bounded) -> tuple[Bounded, str, fl
         finer = halvings < MAX_HALVINGS
         problem = search.problem
         coarse = excess > HALVING_EXCESS or (finer and on_grid > MAX_ROUNDS_PER_GRID)
-        again = None if coarse else _solved_tighter(search, outcome, sides)
+        again = None if coarse else _solved_tighter(search, ended, sides)
         failed = again is None or not (_goes_on(search, again) or again.why in STOPPED)
         if failed and finer:
             halvings, on_grid = halvings + 1, 0
             search.back_to(problem)
-            again, reason = _solved_on_halves(search, outcome, sides)
+            again, reason = _solved_on_halves(search, ended, sides)
         if again is None:
             break
-        outcome = again
+        ended = again
         if not usable(again):
             break
-    if not reason and excess > tolerance and outcome.why in (Reason.STATIONARY, Reason.DIVERGED):
+    if not reason and excess > tolerance and ended.why in (Reason.STATIONARY, Reason.DIVERGED):
         reason = (
-            f"{search.worst(outcome.x)}, between the quadrature points, at which limits are "
+            f"{search.worst(ended.x)}, between the quadrature points, at which limits are "
             "imposed; use more intervals"
         )
-    return outcome, reason, excess
+    return ended, reason, excess
 
 
-def usable(outcome: Bounded) -> bool:
+def usable(ended: Bounded) -> bool:
     """Whether the motion is within bounds at the points, even if not a minimum yet."""
-    return outcome.feasible and outcome.why in (Reason.STATIONARY, Reason.ITERATION_LIMIT)
+    return ended.feasible and ended.why in (Reason.STATIONARY, Reason.ITERATION_LIMIT)
 
 
-def _goes_on(search: BoundedSearch, outcome: Bounded) -> bool:
+def _goes_on(search: BoundedSearch, ended: Bounded) -> bool:
     """Whether bounds may be tightened further; with a free duration, after a minimum alone."""
-    return usable(outcome) and not (search.timed and outcome.why is Reason.ITERATION_LIMIT)
+    return usable(ended) and not (search.timed and ended.why is Reason.ITERATION_LIMIT)
 
 
-def _solved_tighter(search: BoundedSearch, outcome: Bounded, sides: Array) -> Bounded:
+def _solved_tighter(search: BoundedSearch, ended: Bounded, sides: Array) -> Bounded:
     """Solve again with the bounds tightened in proportion to the excess of the interpolant."""
     factors = _tightening_factors(search, sides)
     tighter = np.where(sides > 0, factors * sides + EXTRA_TIGHTENING * search.limits.tolerance, 0.0)
@@ -104,16 +104,16 @@ def _solved_tighter(search: BoundedSearch, outcome: Bounded, sides: Array) -> Bo
     search.margins = np.clip(search.margins + tighter + looser, 0.0, MAX_MARGIN)
     objective = search.objective(search.multipliers)
     share = float(np.clip(1e-2 * float(sides.max()), *WARM_MU_RANGE))
-    mu = share * outcome.outputs.density(objective.bounds.measure)
-    y, barrier = objective.outputs(outcome.x).y, outcome.barrier
-    start = barrier.warm(objective.bounds, y, mu) if len(y) == len(barrier.s) else None
+    mu = share * ended.outputs.density(objective.bounds.measure)
+    y, barrier = objective.outputs(ended.x).y, ended.z
+    z = barrier.warm(objective.bounds, y, mu) if len(y) == len(barrier.s) else None
     whole = search.criteria
     if search.timed:
         most = min(TIMED_STEPS, whole.max_iterations)
         search.criteria = dataclasses.replace(whole, max_iterations=most)
-    outcome = search.solve(outcome.x, start)
+    ended = search.solve(Start(ended.x, z))
     search.criteria = whole
-    return outcome
+    return ended
 
 
 def _tightening_factors(search: BoundedSearch, sides: Array) -> Array:
@@ -129,7 +129,7 @@ def _tightening_factors(search: BoundedSearch, sides: Array) -> Array:
     return np.maximum(SECANT_FACTOR / np.maximum(rate, slowest), TIGHTENING_FACTOR)
 
 
-def _solved_on_halves(search: BoundedSearch, outcome: Bounded, sides: Array) -> tuple[Bounded, str]:
+def _solved_on_halves(search: BoundedSearch, ended: Bounded, sides: Array) -> tuple[Bounded, str]:
     """Solve again with those intervals halved in which a limit is exceeded, and their neighbours.
 
     From the motion, if its excess is within WARM_EXCESS and that succeeds; else from the initial
@@ -143,7 +143,7 @@ def _solved_on_halves(search: BoundedSearch, outcome: Bounded, sides: Array) -> 
     chosen[:-1] |= worst[1:]
     motion, guess = (
         stretched(search.problem.trajectory(path), grid.duration, grid.order)
-        for path in (outcome.x, search.guess)
+        for path in (ended.x, search.guess)
     )
     search.problem = search.problem.on(grid.halved(chosen))
     search.guess = search.problem.path(guess)
@@ -152,7 +152,7 @@ def _solved_on_halves(search: BoundedSearch, outcome: Bounded, sides: Array) -> 
     search.rows = search.coarse_rows()
     if search.near is not None:
         search.near = search.no_near_rows()
-    if usable(outcome) and by_interval.max() <= WARM_EXCESS:
+    if usable(ended) and by_interval.max() <= WARM_EXCESS:
         again = solved_from(search, search.problem.path(motion))
         if usable(again) or again.why in STOPPED:
             return again, ""

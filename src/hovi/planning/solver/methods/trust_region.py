@@ -8,8 +8,9 @@ import numpy as np
 
 from hovi.discrete.grid import DiscretePath
 from hovi.optimize.criteria import Criteria
-from hovi.optimize.ended import Reason
-from hovi.optimize.trust_region import Outcome, minimize
+from hovi.optimize.ended import Ended, Reason
+from hovi.optimize.start import Start
+from hovi.optimize.trust_region import minimize
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.methods.method import Method, MethodResult, Report
@@ -34,30 +35,31 @@ class TrustRegion(Method):
     ) -> MethodResult:
         """See Method.minimize."""
         objective = ActionObjective(problem)
-        outcome = minimize(objective, path, dataclasses.replace(criteria, exact=True), report)
-        n_neg = 0 if outcome.convex else negative_eigenvalues(objective, outcome)
-        outcome.value += price_of_time(problem)
-        status, message = status_of(problem, outcome, n_neg)
+        exact = dataclasses.replace(criteria, exact=True)
+        ended = minimize(objective, Start(path), exact, report)
+        n_neg = 0 if ended.convex else negative_eigenvalues(objective, ended)
+        cost, nit = ended.value + price_of_time(problem), len(ended.steps)
+        status, message = status_of(problem, ended, cost, nit, n_neg)
         return MethodResult(
             problem,
-            outcome.x,
-            outcome.value,
+            ended.x,
+            cost,
             status,
-            message + chart_sentence(problem, outcome.x),
-            outcome.iterations,
+            message + chart_sentence(problem, ended.x),
+            nit,
             n_neg,
-            outcome.history,
-            jets=objective.jets(outcome.x),
-            model=outcome.model,
+            ended.steps,
+            jets=objective.jets(ended.x),
+            model=ended.model,
         )
 
 
-def negative_eigenvalues(objective: ActionObjective, outcome: Outcome[DiscretePath]) -> int:
+def negative_eigenvalues(objective: ActionObjective, ended: Ended[DiscretePath, None]) -> int:
     """n_neg of the exact Hessian; -1 if the value is not finite, or if time runs out."""
-    if outcome.why is Reason.DIVERGED or not np.isfinite(outcome.value):
+    if ended.why is Reason.DIVERGED or not np.isfinite(ended.value):
         return -1
     try:
-        definite = objective.model(outcome.x, None, None).factor(0.0) is not None
-        return 0 if definite else objective.negative_eigenvalues(outcome.x)
+        definite = objective.model(ended.x, None, None).factor(0.0) is not None
+        return 0 if definite else objective.negative_eigenvalues(ended.x)
     except OutOfTimeError:
         return -1

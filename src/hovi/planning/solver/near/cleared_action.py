@@ -10,7 +10,8 @@ import numpy.typing as npt
 from hovi.discrete.contraction import Expansion
 from hovi.discrete.grid import DiscretePath
 from hovi.optimize.barrier import Bounds
-from hovi.optimize.bounded_objective import Outputs, Refinement
+from hovi.optimize.bounded_objective import Refinement
+from hovi.optimize.ended import Outputs
 from hovi.optimize.quadratic_model import QuadraticModel
 from hovi.planning.clearance.clearance import DISTANCE_SCALE
 from hovi.planning.problem.limits import Limits
