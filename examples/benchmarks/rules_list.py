@@ -81,14 +81,14 @@ _rule(
     "stationary by size",
     "A step that is small relative to the data ends a solve whose decrease is not small.",
     "_is_stationary",
-    "short and objective.relative_size(outcome.x, trial.step, model) <= criteria.step",
+    "short and objective.relative_size(ended.x, trial.step, model) <= criteria.step",
     "False",
 )
 _rule(
     "last step within rounding",
     "A last Newton step is accepted although the value rises within rounding.",
     "_iterate",
-    "settled and value <= outcome.value + 100 * noise",
+    "settled and value <= ended.value + 100 * noise",
     "False",
 )
 _rule(
@@ -259,7 +259,7 @@ _rule(
     "wide radius of warm starts",
     "A warm start within limits has a first radius of 1000 instead of 50.",
     "minimize_bounded",
-    "cold if start is None else warm",
+    "cold if start.z is None else warm",
     "cold",
 )
 _rule(
@@ -288,7 +288,7 @@ _rule(
     "raise mu when bounds cut",
     "After four steps in a row that bounds cut, mu is raised tenfold.",
     "_Iteration._raise_mu",
-    "self.cut < MOST_CUT or mu <= outcome.barrier.mu",
+    "self.cut < MOST_CUT or mu <= ended.z.mu",
     "True",
 )
 _rule(
@@ -316,7 +316,7 @@ _rule(
     "end at a saddle that is not left",
     "A solve that stalls at a saddle ends there as stationary.",
     "_Iteration.run",
-    "self.outcome.x is self.saddle",
+    "self.ended.x is self.saddle",
     "False",
     times=2,
 )
@@ -331,7 +331,7 @@ _rule(
     "short steps are no progress",
     "Steps far shorter than the radius count as stalled while bounds are not met.",
     "_Iteration._try",
-    "short and not (outcome.feasible and length > NO_LENGTH)",
+    "short and not (ended.feasible and length > NO_LENGTH)",
     "False",
 )
 _rule(
@@ -349,17 +349,17 @@ _rule(
     "False",
 )
 _rule(
-    "mark again",
-    "A later point takes the place of a marked one up to 1.5 times its product.",
-    "_Iteration._mark",
-    "product <= MARKED_AGAIN * self.marked",
+    "save again",
+    "A later iterate takes the place of a saved one up to 1.5 times its product.",
+    "_Iteration._save",
+    "product <= SAVED_AGAIN * self.first_product",
     "False",
 )
 _rule(
-    "drop marks",
+    "drop saved iterates",
     "Marked points with a smaller mu are dropped where mu is raised.",
-    "_Iteration._drop_marks",
-    "mark[0] > mu",
+    "_Iteration._drop_saved",
+    "each[0] > mu",
     "True",
 )
 _rule(
@@ -373,7 +373,7 @@ _rule(
     "rows at once",
     "Rows of distances are added after any step that brings a pair near.",
     "_Iteration._refined",
-    "self.objective.refine_at_once(outcome.x)",
+    "self.objective.refine_at_once(ended.x)",
     "None",
     False,
 )
@@ -555,7 +555,7 @@ _rule(
     "rounds where Lagrange-Newton fails",
     "Rounds of an augmented Lagrangian follow where it diverges.",
     "_Search.run",
-    "not found.stuck",
+    "found.why is Reason.DIVERGED",
     "False",
 )
 _at("equations", "planning.solver.methods.bounded_search")
@@ -563,7 +563,7 @@ _rule(
     "equations in the steps",
     "Within limits steps meet conditions at nodes, instead of rounds.",
     "BoundedSearch.solve",
-    "self._solved_under_conditions(path, start)",
+    "self._solved_under_conditions(start)",
     "None",
     False,
 )
@@ -638,7 +638,7 @@ _rule(
     "anew where a central path fails",
     "Without known rows a solve from the guess follows one along the central path.",
     "_solved_nearby",
-    "along is not None and along.rows is None and not outcome.settled",
+    "along is not None and along.rows is None and not ended.settled",
     "False",
 )
 _rule(
@@ -702,7 +702,7 @@ _rule(
     "refine a followed solution",
     "Control points of a followed solution are halved.",
     "_Newton.run",
-    "self.most_outside <= ROOM and self._refined()",
+    "self.criteria.outside <= ROOM and self._refined()",
     "False",
     False,
 )
@@ -836,7 +836,7 @@ _rule(
     "the other rough motion",
     "Where the better rough motion diverges, the other is solved on.",
     "cleared_motion",
-    "outcome.why is not Reason.DIVERGED",
+    "ended.why is not Reason.DIVERGED",
     "True",
 )
 _rule(
@@ -1031,7 +1031,7 @@ _rule(
     "halved intervals from the motion",
     "A solve on halved intervals begins at the motion.",
     "_solved_on_halves",
-    "usable(outcome) and by_interval.max() <= WARM_EXCESS",
+    "usable(ended) and by_interval.max() <= WARM_EXCESS",
     "False",
 )
 _at("attempts", "planning.solver.methods.feasibility")
@@ -1039,14 +1039,14 @@ _rule(
     "plain steps and finer parts",
     "A solve that diverged with corrected steps is repeated with plain ones and finer parts.",
     "feasible_motion",
-    "outcome.corrected",
+    "ended.corrected",
     "False",
 )
 _rule(
     "end at least violations",
     "A search ends where three guesses lead to nonzero minima of the violation.",
     "feasible_motion",
-    "locally_infeasible(search, outcome)",
+    "locally_infeasible(search, ended)",
     '""',
     False,
 )
@@ -1105,7 +1105,7 @@ _rule(
     "False",
 )
 _rule(
-    "marks of like durations",
+    "saved iterates of like durations",
     "Points of a solve that moves the duration are kept within a tenth of the last.",
     "TimedSearch._at_its_duration",
     "abs(T / x.duration - 1.0) <= SAME_DURATION",

@@ -13,7 +13,6 @@ from hovi.planning.conditions.condition import describe, is_spurious
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.multipliers import Multipliers, Residuals, largest_residual
-from hovi.system.dataclass import dataclass
 
 INITIAL_TORQUE_PENALTY = 10.0
 """Initial penalty of passive torques, relative to the mean weight of the other joints."""
