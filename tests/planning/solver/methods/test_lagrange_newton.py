@@ -233,6 +233,29 @@ def test_a_rod_within_limits_buckles_too(load: float) -> None:
     assert (found.cost < -0.1) == (not straight)
 
 
+@pytest.mark.parametrize("bend", [1e-3, -1e-3])
+@pytest.mark.parametrize("kind", ["free", "held", "limited"])
+def test_a_rod_buckles_to_the_side_to_which_it_is_bent(kind: str, bend: float) -> None:
+    """Next to a saddle the cost falls to both sides, and the way leads on downhill."""
+    held = kind == "held"
+    problem = rod(100.0 if held else 60.0, held)
+    if kind == "limited":
+        limits = hovi.as_limits(problem.coordinates, {"base": "none", "v": 5.0})
+        problem = dataclasses.replace(problem, limits=limits)
+    waves = 2 if held else 1
+
+    def bent(t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        s, w = t[:, None], 2 * np.pi * waves
+        bell, slope = (s * (1 - s)) ** 2, 2 * s * (1 - s) * (1 - 2 * s)
+        curve = np.sin(w * s / 2)
+        return bend * bell * curve, bend * (slope * curve + bell * w / 2 * np.cos(w * s / 2)), 0 * s
+
+    found = solve(problem, problem.path(bent))
+    assert found.success, found.message
+    assert found.cost < -0.1
+    assert np.sign(found.trajectory.q[5, 0]) == np.sign(bend)
+
+
 def test_via_points_that_contradict_each_other_are_infeasible() -> None:
     """And in a fraction of the steps that the rounds take to give up."""
     at = place(HALFWAY)
