@@ -2,29 +2,30 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from time import monotonic
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 
 from hovi import Solution, Status, plan
-from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import Grid
 from hovi.discrete.measures.motion_error import deviation
 from hovi.discrete.state import State
 from hovi.discrete.trajectory import Trajectory
 from hovi.effects import Gravity
-from hovi.planning.problem.limits import as_limits
-from hovi.planning.problem.problem import TrajectoryProblem
-from hovi.planning.problem.tolerance import Accuracy, Round, Tolerance
-from hovi.planning.refinement.adaptive import first_grid, refine_to_tolerance, solve_to_tolerance
-from hovi.planning.refinement.candidate import ROUNDING_FLOOR
-from hovi.planning.refinement.error_estimate import FinerSolution, finer_than
+from hovi.planning.problem.tolerance import Accuracy
 from hovi.planning.task_file.reading import load_task
 from hovi.planning.task_file.task import Task
 from hovi.robot.bundled_models import example
 from hovi.robot.loading import load_robot
 from hovi.robot.robot import Robot
+from hovi.scene.effort_lagrangian import EffortLagrangian
 from hovi.scene.scene import Scene
 from hovi.schemes import galerkin
+from hovi.system import deadline
 from oracles.on_grid import solve_on_grid
 from samples.paper_arm import HANG, REACH_Q, REACH_V
 
@@ -117,44 +118,75 @@ def test_no_error_below_rounding_is_claimed(arm_scene: Scene) -> None:
     accuracy = accuracy_of(found)
     assert found.success
     assert not accuracy.reached
-    assert accuracy.error >= ROUNDING_FLOOR
+    assert accuracy.error >= 1e-14
     assert "stopped early: rounding allows no smaller error" in found.message
 
 
-def test_a_time_limit_is_reported_with_the_error_so_far(arm_scene: Scene) -> None:
-    ld = DiscreteLagrangian(arm_scene.effort_lagrangian(), Grid.uniform(1.0, 4, galerkin(0)))
-    problem = TrajectoryProblem(ld, State(HANG), State(REACH_Q, REACH_V))
-    first = solve_on_grid(problem)
-    tolerance = Tolerance(1e-9)
-    ended = refine_to_tolerance(first, tolerance, time_limit=1e-9)
+class AtRound:
+    """A progress of a plan that counts the grids that are reported, and acts at one of them."""
+
+    def __init__(self, number: int, act: Callable[[], None]) -> None:
+        self._number, self._act, self.texts = number, act, list[str]()
+
+    def __call__(self, text: str, fraction: float) -> None:
+        if "estimated error" in text:
+            self.texts.append(text)
+            if len(self.texts) == self._number:
+                self._act()
+
+
+def test_a_time_limit_is_reported_with_the_error_so_far(
+    arm_scene: Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By a clock that leaps after the first grid."""
+    leap = 0.0
+
+    def late() -> None:
+        nonlocal leap
+        leap = 1e6
+
+    monkeypatch.setattr(deadline, "time", SimpleNamespace(monotonic=lambda: monotonic() + leap))
+    given = {"limits": "none", "tolerance": 1e-10, "intervals": 6, "time_limit": 1e5}
+    goal = State(REACH_Q, REACH_V)
+    ended = plan(arm_scene, HANG, goal, 1.0, **given, progress=AtRound(1, late))
     accuracy = accuracy_of(ended)
     assert (ended.success, accuracy.reached) == (True, False)
-    assert accuracy.error > 1e-3
+    assert len(accuracy.rounds) == 1
+    assert accuracy.error == accuracy.rounds[0].error > 1e-7
     assert "stopped early: the time limit was reached" in ended.message
 
 
-@pytest.mark.parametrize("finished", [0, 1])
 def test_an_interrupt_returns_the_best_candidate(
-    arm_scene: Scene, monkeypatch: pytest.MonkeyPatch, finished: int
+    arm_scene: Scene, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    estimates = 0
+    """In the first solve, in the first comparison, and later."""
+    output, calls, last = EffortLagrangian.output, 0, -1
 
-    def interrupted(solution: Solution, time_limit: float | None) -> FinerSolution | None:
-        nonlocal estimates
-        estimates += 1
-        if estimates > finished:
+    def interrupting(self: EffortLagrangian, *jet: Any, **more: Any) -> Any:
+        nonlocal calls
+        calls += 1
+        if calls == last:
             raise KeyboardInterrupt
-        return finer_than(solution, time_limit)
+        return output(self, *jet, **more)
 
-    monkeypatch.setattr("hovi.planning.refinement.candidate.finer_than", interrupted)
-    goal = State(REACH_Q, REACH_V)
-    found = plan(arm_scene, HANG, goal, 1.0, limits="none", tolerance=1e-10)
-    accuracy = accuracy_of(found)
-    assert (found.success, found.status) == (False, Status.INTERRUPTED)
-    assert not accuracy.reached
-    assert "it was interrupted" in found.message
-    assert np.isnan(accuracy.error) == (finished == 0)
-    assert (found.error_estimate is None) == (finished == 0)
+    monkeypatch.setattr(EffortLagrangian, "output", interrupting)
+    ends, given = (arm_scene, HANG, State(REACH_Q, REACH_V), 1.0), {"intervals": 6}
+    assert plan(*ends, limits="none", tolerance=1e-10, **given).success
+    whole, known = calls, list[float]()
+    for number in range(2, whole, 2):
+        calls, last = 0, number
+        found = plan(*ends, limits="none", tolerance=1e-10, **given)
+        assert not found.success
+        assert found.status in (Status.INTERRUPTED, Status.UNRESOLVED)
+        assert "interrupted" in found.message
+        if found.accuracy is None:  # before the refinement
+            assert found.error_estimate is None
+        else:
+            assert not found.accuracy.reached
+            assert np.isnan(found.accuracy.error) == (found.error_estimate is None)
+            known.append(found.accuracy.error)
+    assert np.isnan(known).any()
+    assert not np.isnan(known).all()
 
 
 @pytest.mark.long
@@ -209,11 +241,13 @@ def test_a_sharp_turn_gets_the_short_intervals() -> None:
 
 
 def test_every_round_is_reported(arm_scene: Scene) -> None:
-    rounds: list[Round] = []
-    ld = DiscreteLagrangian(arm_scene.effort_lagrangian(), Grid.uniform(1.0, 8, galerkin(1)))
-    problem = TrajectoryProblem(ld, State(HANG), State(REACH_Q, REACH_V))
-    found = solve_to_tolerance(problem, Tolerance(1e-8), on_round=rounds.append)
-    assert tuple(rounds) == accuracy_of(found).rounds
+    reports, goal = AtRound(-1, lambda: None), State(REACH_Q, REACH_V)
+    given = {"limits": "none", "tolerance": 1e-10, "intervals": 6}
+    found = plan(arm_scene, HANG, goal, 1.0, **given, progress=reports)
+    rounds = accuracy_of(found).rounds
+    assert reports.texts == [
+        f"{done.intervals} intervals, estimated error {done.error:.1e}" for done in rounds
+    ]
     assert len(rounds) >= 2
 
 
@@ -288,69 +322,74 @@ def test_no_error_below_the_tolerance_of_limits_is_claimed(arm_scene: Scene) -> 
     assert "stopped early" in found.message
 
 
-def test_within_limits_a_solve_at_its_iteration_limit_is_continued() -> None:
-    """Once: a UR5 needs 13 steps on the second grid, and a sixth of them do not suffice."""
-    task = load_task(example("ur5_reach_limited"))
-    grid = first_grid(task.duration, 16, smooth=False)
-    ld = DiscreteLagrangian(task.scene.effort_lagrangian(), grid)
-    limits = as_limits(task.scene.robot, task.options.limits)
-    first = solve_on_grid(TrajectoryProblem(ld, task.start, task.goal, limits))
-    whole, continued, stopped = (
-        refine_to_tolerance(first, Tolerance(1e-3), max_iterations=most) for most in (500, 10, 2)
-    )
-    assert whole.success
-    assert continued.success
-    assert continued.cost == pytest.approx(whole.cost, rel=1e-4)
-    assert accuracy_of(continued).rounds[1].nit > 20  # of both
-    assert "stopped early: the last solve ended in iteration_limit" in stopped.message
+@pytest.mark.parametrize("most", [10, 40, 60, 100])
+def test_within_limits_few_steps_end_in_the_same_motion_or_are_told(
+    tight_reach: dict[str, Any], most: int
+) -> None:
+    """A solve on a finer grid that reaches its iteration limit is continued once, from 40 on."""
+    whole = plan(**tight_reach)
+    found = plan(**tight_reach, max_iterations=most, continuation=False)
+    assert whole.success, whole.message
+    assert found.success == (most > 10)
+    if found.success:
+        assert accuracy_of(found).reached
+        assert found.cost == pytest.approx(whole.cost, rel=1e-6)
+    else:
+        assert found.status is Status.ITERATION_LIMIT
+        assert not accuracy_of(found).reached
+        assert "the iteration limit was reached" in found.message
 
 
-def test_a_solve_that_halved_intervals_is_continued_on_its_own_grid() -> None:
-    """As it may within limits on torques."""
-    robot = load_robot("ur5")
-    scene, grid = Scene(robot, [Gravity()]), Grid.uniform(0.6, 6, galerkin(2))
-    ld = DiscreteLagrangian(scene.effort_lagrangian(), grid)
-    start, goal = State([0.0, -1.57, 1.57, -1.57, -1.57, 0.0]), State([1.5, -1, 1, -1.5, -1, 0.5])
-    free = solve_on_grid(TrajectoryProblem(ld, start, goal)).trajectory
+@pytest.fixture(scope="module")
+def tight_reach() -> dict[str, Any]:
+    """A UR5 within nine tenths of the torques that it would take, which halves intervals."""
+    scene = Scene(load_robot("ur5"), [Gravity()])
+    ends = {
+        "scene": scene,
+        "start": [0.0, -1.57, 1.57, -1.57, -1.57, 0.0],
+        "goal": [1.5, -1.0, 1.0, -1.5, -1.0, 0.5],
+        "duration": 0.6,
+        "self_collision": False,
+    }
+    free = plan(**ends, limits="none", scheme="galerkin-2", intervals=6).trajectory
     most = 0.9 * np.abs(free.sample(np.linspace(0.0, 0.6, 101)).tau).max(axis=0)
-    limits = as_limits(robot, {"base": "none", "tau": most})
-    first = solve_on_grid(TrajectoryProblem(ld, start, goal, limits))
-    on: list[int] = []
-    found = refine_to_tolerance(
-        first, Tolerance(1e-6), max_iterations=20, on_round=lambda done: on.append(done.intervals)
-    )
-    assert found.success
-    assert on[1] > 19  # the next grid has so many
+    return ends | {"limits": {"base": "none", "tau": most}, "tolerance": 1e-6, "intervals": 6}
 
 
 def test_an_interrupt_after_some_grids_returns_the_most_accurate_motion(arm_scene: Scene) -> None:
     """Under a limit, which takes many grids."""
-    ld = DiscreteLagrangian(arm_scene.effort_lagrangian(), Grid.uniform(1.0, 6, galerkin(2)))
-    limits = as_limits(arm_scene.robot, {"base": "none", "tau": 6.5, "tolerance": 1e-9})
-    first = solve_on_grid(TrajectoryProblem(ld, State(HANG), State(REACH_Q, REACH_V), limits))
-    rounds: list[Round] = []
+    limits = {"base": "none", "tau": 6.5, "tolerance": 1e-9}
 
-    def on_round(done: Round) -> None:
-        rounds.append(done)
-        if len(rounds) == 3:
-            raise KeyboardInterrupt
+    def interrupt() -> None:
+        raise KeyboardInterrupt
 
-    ended = refine_to_tolerance(first, Tolerance(1e-12), on_round=on_round)
-    finished = rounds[:2]  # the last one was not compared any more
+    goal = State(REACH_Q, REACH_V)
+    given = {"limits": limits, "intervals": 6, "tolerance": 1e-12}
+    ended = plan(arm_scene, HANG, goal, 1.0, **given, progress=AtRound(3, interrupt))
+    accuracy = accuracy_of(ended)
+    finished = accuracy.rounds[:2]  # the last one was not compared any more
     best = min(finished, key=lambda done: done.error)
     assert best is finished[1]
     assert ended.status is Status.INTERRUPTED
     assert ended.cost == best.cost
-    assert accuracy_of(ended).error >= best.error
-    assert accuracy_of(ended).error < 0.5 * finished[0].error
+    assert accuracy.error >= best.error
+    assert accuracy.error < 0.5 * finished[0].error
 
 
-def test_the_first_grids_are_those_that_the_page_on_tolerances_states() -> None:
+@pytest.mark.parametrize(
+    ("intervals", "number", "limited"),
+    [(1, 1, 1), (2, 1, 2), (16, 10, 16), (60, 40, 60), (1000, 40, 60)],
+)
+def test_the_first_grids_are_those_that_the_page_on_tolerances_states(
+    arm_scene: Scene, intervals: int, number: int, limited: int
+) -> None:
     """docs/tolerance.md: of 16 intervals 10, and 40 at most; 60 at most where kinks are."""
-    for intervals, number in ((1, 1), (2, 1), (16, 10), (60, 40), (1000, 40)):
-        for more_points, name in ((False, "galerkin-4"), (True, "galerkin-4x10")):
-            grid = first_grid(1.5, intervals, more_points=more_points)
-            assert (grid.intervals, grid.schemes[0].name) == (number, name)
-    for intervals, number in ((1, 1), (16, 16), (60, 60), (1000, 60)):
-        grid = first_grid(1.5, intervals, smooth=False)
-        assert (grid.intervals, grid.schemes[0].name) == (number, "galerkin-2x8")
+    once = {"max_iterations": 1, "continuation": False, "tolerance": 1e-3, "intervals": intervals}
+    for limits, most, scheme in (
+        ("none", number, "galerkin-4"),
+        ({"base": "none", "v": 50.0}, limited, "galerkin-2x8"),
+    ):
+        found = plan(arm_scene, HANG, REACH_Q, 1.5, limits=limits, **once)
+        grid = found.trajectory.grid
+        assert grid.intervals == accuracy_of(found).rounds[0].intervals == most
+        assert {each.name for each in grid.schemes} <= {scheme, "galerkin-4x10"}
