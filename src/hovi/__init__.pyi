@@ -43,6 +43,10 @@ from .flows.symmetry import Symmetry as Symmetry
 from .flows.symmetry import base_rotation as base_rotation
 from .flows.symmetry import base_translation as base_translation
 from .planning.clearance.clearance import Clearance as Clearance
+from .planning.conditions.condition import Condition as Condition
+from .planning.conditions.places import AtTimes as AtTimes
+from .planning.conditions.sets import Between as Between
+from .planning.conditions.sets import Equal as Equal
 from .planning.obstacles.grasped import Grasped as Grasped
 from .planning.obstacles.grasped import holding as holding
 from .planning.obstacles.mesh import ConvexParts as ConvexParts

@@ -98,6 +98,10 @@ class EffortLagrangian(Lagrangian):
         """tau at P points, shape (P, nv)."""
         return self.torques.torque(jet[0], jet[1], jet[2], t)
 
+    def torque_slopes(self, *jet: Array, t: Array | None = None) -> Array:
+        """d tau / d(q, v, a), shape (P, nv, 3 nv)."""
+        return self.torques.linearize(jet[0], jet[1], jet[2], t)[1]
+
     def predicted_slope(self, outputs: Array, jacobian: Array, change: Array) -> Array:
         """R (tau + J dx), shape (P, nv)."""
         return predict(outputs, self.weight, jacobian, change)
@@ -187,7 +191,7 @@ class EffortLagrangian(Lagrangian):
         value, gradient = expand_squares(tau, self.weight, J, force)
         if terms is not None:
             gradient += terms.jet_gradient
-            add_weights(hessian, terms, self.nv)
+            add_weights(hessian, terms)
         if self.potential is not None:
             V, dV, ddV = self.potential.expand(q, v, a, t=t)
             value, gradient, hessian = value + V, gradient + dV, hessian + ddV

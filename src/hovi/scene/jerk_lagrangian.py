@@ -106,6 +106,10 @@ class JerkLagrangian(Lagrangian):
         rate = TorqueRate(self.effort.torques, q, v, a, j, self.space)
         return np.concatenate([tau, rate.value(J)], axis=1)
 
+    def torque_slopes(self, *jet: Array, t: Array | None = None) -> Array:
+        """d tau / d(q, v, a), shape (P, nv, 3 nv)."""
+        return self.effort.torque_slopes(*jet[:3], t=t)
+
     @check_arguments
     def reweighted(self, weight: Array) -> JerkLagrangian:
         """The same Lagrangian with another R; weight: as `output_weight`."""
@@ -193,7 +197,7 @@ class JerkLagrangian(Lagrangian):
             terms.jet_weight[:, : 3 * n],
             np.ascontiguousarray(terms.output_gradient[:, :n]),
             np.ascontiguousarray(terms.output_weight[:, :n]),
-            terms.configuration_weight,
+            terms.leading_weight,
         )
 
 

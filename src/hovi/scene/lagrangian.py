@@ -24,17 +24,17 @@ class PointTerms:
 
     With the jet x = (q, v, a, ...) and the outputs y(x) of the Lagrangian, gradient:
     jet_gradient + J^T output_gradient; Hessian: diag(jet_weight) + J^T diag(output_weight) J, and
-    configuration_weight in its block of q.
+    leading_weight in the block of the first m entries of the jet, such as q.
 
     jet_gradient, jet_weight: shape (P, (k+1) nv). output_gradient, output_weight: shape (P, m).
-    configuration_weight: shape (P, nv, nv); none when None.
+    leading_weight: shape (P, m, m); none when None.
     """
 
     jet_gradient: Array
     jet_weight: Array
     output_gradient: Array
     output_weight: Array
-    configuration_weight: Array | None = None
+    leading_weight: Array | None = None
 
     @classmethod
     def on_outputs(cls, gradient: Array, jet_size: int) -> PointTerms:
@@ -135,6 +135,10 @@ class Lagrangian(ABC):
         """y at P points, shape (P, m)."""
         return np.zeros((len(jet[0]), 0))
 
+    def torque_slopes(self, *jet: Array, t: Array | None = None) -> Array:
+        """d tau / d(q, v, a) of the outputs that are torques, shape (P, nv, 3 nv)."""
+        raise NotImplementedError
+
     def output_slope(self, outputs: Array) -> Array:
         """R y, shape (P, m)."""
         return self.output_weight * outputs
@@ -176,7 +180,7 @@ class Lagrangian(ABC):
         gradient, hessian = gradient.reshape(-1, size), hessian.reshape(-1, size, size)
         if terms is not None:
             gradient, hessian = gradient + terms.jet_gradient, hessian.copy()
-            add_weights(hessian, terms, self.nv)
+            add_weights(hessian, terms)
         outputs = self.output(*jet, t=t)
         return PointExpansion(value, gradient, hessian, outputs, np.zeros((len(value), 0, size)))
 
@@ -216,10 +220,11 @@ class NoCost(Lagrangian):
         return np.zeros(P), np.zeros((P, rows, n)), np.zeros((P, rows, n, rows, n))
 
 
-def add_weights(hessian: Array, terms: PointTerms, nv: int) -> None:
+def add_weights(hessian: Array, terms: PointTerms) -> None:
     """Add the contributions of limits on the jet to its Hessian, in place."""
     if terms.jet_weight.any():
         diagonal = np.arange(hessian.shape[1])
         hessian[:, diagonal, diagonal] += terms.jet_weight
-    if terms.configuration_weight is not None:
-        hessian[:, :nv, :nv] += terms.configuration_weight
+    if terms.leading_weight is not None:
+        m = terms.leading_weight.shape[1]
+        hessian[:, :m, :m] += terms.leading_weight

@@ -86,23 +86,24 @@ _OPERATORS: dict[type[ast.operator], Callable[[ca.SX, ca.SX], ca.SX]] = {
 }
 
 
-def expression(what: str, given: Number, symbols: Symbols) -> ca.SX:
+def expression(what: str, given: Number, symbols: Symbols, columns: bool = False) -> ca.SX:
     """A number or a formula as a CasADi expression.
 
     what: the effect and its key, the start of messages.
     given: a finite number, or a string of + - * / **, brackets, pi, sin, cos, tan, asin, acos,
         atan, atan2, exp, log, sqrt, tanh, abs, min, max, sum, dot and the symbols.
+    columns: whether it may be a column of numbers.
     Raises SceneError.
     """
     if isinstance(given, str):
         value = _walk(_parsed(what, given), _Reader(what, given, symbols), 0)
     else:
         value = ca.SX(float(given))
-    if not value.is_scalar():
+    if not (columns or value.is_scalar()):
         raise _Reader(what, str(given), symbols).refused(
             f"is a column of {value.numel()} numbers where one is needed: take sum(...) of it"
         )
-    if value.is_constant() and not np.isfinite(float(value)):
+    if value.is_constant() and not np.isfinite(ca.DM(value).full()).all():
         raise SceneError(f"{what} must be a finite number or a formula, got {given!r}.")
     return value
 

@@ -2,41 +2,165 @@
 
 from __future__ import annotations
 
-from typing import Generic, TypeVar
+import dataclasses
+from functools import lru_cache
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
+from hovi.checks.kinds import is_number
+from hovi.checks.shapes import numbers_of
 from hovi.discrete.grid import DiscretePath
+from hovi.errors import InputError
+from hovi.planning.conditions.expression import Given, function_of
 from hovi.planning.conditions.function import Function, at_state, bend, linear
-from hovi.planning.conditions.places import AtNode, Where
+from hovi.planning.conditions.places import AtNode, AtPoints, AtTimes, Where
 from hovi.planning.conditions.sets import Between, Equal
+from hovi.robot.space.coordinates import Coordinates
 from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 Values = TypeVar("Values", bound=Equal | Between, covariant=True)
 Place = TypeVar("Place", bound=Where, covariant=True)
 
+TOLERANCE = 1e-6
+"""Share of its scale by which a bound may be exceeded."""
+EVERYWHERE: Any = AtPoints()
+
 
 @dataclass(frozen=True, eq=False)
 class Condition(Generic[Values, Place]):
     """y(q, v, a, tau, t) in a set, at instants of a motion.
 
-    function: y. on: the set. where: the instants.
+    Bounds hold at all times; a value, of a function of q, v and t, at given times.
+
+    function: y: a formula as of the effect RunningCost, which may be a column, as in "tau * v"; a
+        function that returns a CasADi expression of the arguments that it names, of q, v, a, tau
+        and t; or a Function.
+    on: hovi.Between(lower, upper) or hovi.Equal(value).
+    where: hovi.AtTimes(times) for a value; left out for bounds.
+    name: in messages. unit: of y, in messages.
+    scale: of y, one number or one for each entry: by default the range between its bounds, or the
+        size of the only one. Bounds that are functions of time need it.
+    tolerance: share of the scale by which a bound may be exceeded anywhere.
+    Raises InputError for anything else.
     """
 
-    function: Function
+    function: Given
     on: Values
-    where: Place
+    where: Place = EVERYWHERE
+    name: str = "given"
+    unit: str = ""
+    scale: npt.ArrayLike | None = None
+    tolerance: float = TOLERANCE
+
+    def __post_init__(self) -> None:
+        if not (isinstance(self.function, str | Function) or callable(self.function)):
+            raise InputError(
+                "the function of a condition must be a formula, a function of CasADi symbols or a "
+                f"Function, got {self.function!r}."
+            )
+        if not isinstance(self.on, Equal | Between):
+            raise InputError(
+                f"a condition needs a hovi.Between or a hovi.Equal, got {self.on!r:.200}."
+            )
+        _require_place(self)
+        if not (is_number(self.tolerance) and 0 < self.tolerance < np.inf):
+            raise InputError(
+                f"condition {self.name!r} needs a positive tolerance, not {self.tolerance!r}."
+            )
+        if self.scale is not None:
+            scale = numbers_of(f"the scale of condition {self.name!r}", self.scale)
+            if scale.ndim > 1 or not (np.isfinite(scale) & (scale > 0)).all():
+                raise InputError(
+                    f"the scale of condition {self.name!r} must be positive, got {self.scale!r}."
+                )
+        elif isinstance(self.on, Between) and self.on.varies:
+            raise InputError(
+                f"condition {self.name!r} has bounds that are functions of time and needs a "
+                "`scale`: the size of its values that counts as large."
+            )
+
+    @property
+    def y(self) -> Function:
+        """The function; of a condition that is `bound`."""
+        assert isinstance(self.function, Function)
+        return self.function
+
+    @property
+    def timed(self) -> bool:
+        """Whether it changes with time, whatever the motion; of a condition that is `bound`."""
+        return "t" in self.y.needs or (isinstance(self.on, Between) and self.on.varies)
+
+
+def _require_place(given: Condition[Any, Any]) -> None:
+    """Raise InputError for sets at places that are not supported."""
+    if isinstance(given.on, Equal) and not isinstance(given.where, AtNode | AtTimes):
+        raise InputError(
+            f"condition {given.name!r} is an equation along the whole motion, which is not "
+            "supported: use `where = hovi.AtTimes(...)`, or a hovi.Between with some room."
+        )
+    if isinstance(given.on, Between) and not isinstance(given.where, AtPoints):
+        raise InputError(
+            f"condition {given.name!r} has bounds, which hold at all times: leave `where` out."
+        )
 
 
 Equation = Condition[Equal, AtNode]
 """c(q, v) = value at a node."""
+Bounded = Condition[Between, AtPoints]
+"""lower <= y(q, v, a, tau, t) <= upper at all times."""
+
+
+@lru_cache(maxsize=256)
+def bound(
+    given: Condition[Equal | Between, Where], coordinates: Coordinates
+) -> Condition[Equal | Between, Where]:
+    """The condition with its function of a robot's coordinates.
+
+    Raises InputError for a function, bounds, a value or a scale that do not fit each other.
+    """
+    y = function_of(given.function, given.name, coordinates)
+    if isinstance(given.on, Between):
+        given.on.at(np.zeros(1), y.size)
+    else:
+        _require_size("value", given, np.asarray(given.on.value), y.size)
+        if more := sorted(y.needs - {"q", "v", "t"}):
+            raise InputError(
+                f"condition {given.name!r} at given times must be a function of q, v and t, but it "
+                f"depends on {' and '.join(more)}."
+            )
+    if given.scale is not None:
+        _require_size("scale", given, np.asarray(given.scale), y.size)
+    return dataclasses.replace(given, function=y)
+
+
+def _require_size(
+    what: str, given: Condition[Equal | Between, Where], numbers: Array, size: int
+) -> None:
+    if numbers.size not in (1, size):
+        raise InputError(
+            f"the {what} of condition {given.name!r} must be one number or {size}, one for each "
+            f"value of its function, got {numbers.size}."
+        )
+
+
+def scales(each: Bounded) -> Array:
+    """The scale of every entry, shape (size,): as given, or the range between the bounds."""
+    if each.scale is not None:
+        return np.broadcast_to(np.asarray(each.scale, dtype=float), (each.y.size,))
+    low, high = (side[0] for side in each.on.at(np.zeros(1), each.y.size))
+    single = np.where(np.isfinite(low), low, high)
+    size = np.maximum(1.0, np.abs(np.where(np.isfinite(single), single, 1.0)))
+    with np.errstate(invalid="ignore"):
+        both = high - low
+    return np.where(np.isfinite(both), both, size)
 
 
 def equation(function: Function, node: int, time: float) -> Equation:
     """c(q, v) = 0 at a node, and the time there in [s]."""
-    return Condition(function, Equal(), AtNode(node, time))
+    return Condition(function, Equal(), AtNode(node, time), "")
 
 
 def residual(each: Equation, x: DiscretePath) -> Array:
@@ -46,21 +170,26 @@ def residual(each: Equation, x: DiscretePath) -> Array:
 
 def linear_at(each: Equation, q: Array, v: Array) -> tuple[Array, Array]:
     """c - value at a state, shape (k,), and its Jacobian in (q, v), shape (k, 2, nv)."""
-    c, J = linear(each.function, q, v, each.where.time)
+    c, J = linear(each.y, q, v, each.where.time)
     return each.on.missed(c), J
 
 
 def bend_at(each: Equation, q: Array, v: Array, weights: Array) -> Array:
     """sum_i weights_i d2 c_i at a state, shape (2, nv, 2, nv)."""
-    return bend(each.function, q, v, weights, each.where.time)
+    return bend(each.y, q, v, weights, each.where.time)
 
 
 def describe(each: Equation, x: DiscretePath) -> str:
     """By how much an equation is missed at a path, as a clause."""
     at = at_state(*each.where.state(x), each.where.time)
-    return each.function.describe(at, residual(each, x))
+    return each.y.describe(at, residual(each, x))
+
+
+def whose(each: Equation) -> str:
+    """What an equation is of, as the subject of a sentence."""
+    return f"condition {each.name!r}" if each.name else "the goal"
 
 
 def is_spurious(each: Equation, x: DiscretePath) -> bool:
     """Whether an equation holds at a path at a root where what is meant does not."""
-    return each.function.is_spurious(at_state(*each.where.state(x), each.where.time))
+    return each.y.is_spurious(at_state(*each.where.state(x), each.where.time))

@@ -48,7 +48,7 @@ def _via_leaves(problem: TrajectoryProblem, limits: Limits) -> str:
     on, T = problem.coordinates, problem.grid.duration
     scene = problem.scene if problem.about_robot else None
     for each in problem.equations:
-        via, t = each.function, each.where.time
+        via, t = each.y, each.where.time
         if not isinstance(via, StateDifference) or limits.parts:  # of both where segments meet
             continue
         jet, window = (via.target, via.velocity), limits.window * T

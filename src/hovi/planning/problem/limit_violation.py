@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
+from typing import ClassVar
+
 import numpy as np
 import numpy.typing as npt
 
@@ -9,6 +12,7 @@ from hovi.discrete.trajectory import Sample, Trajectory
 from hovi.dynamics.torque_rate import TorqueRate
 from hovi.planning.problem.arms.limit_set import KIND_NAMES
 from hovi.planning.problem.limits import FIRST_KINDS, KINDS, Limits
+from hovi.planning.problem.way_back.excused import Excused
 from hovi.robot.robot import Robot
 from hovi.robot.space.configuration_space import ConfigurationSpace
 from hovi.robot.space.coordinates import Coordinates
@@ -39,6 +43,47 @@ AT_LIMIT = 1e-3
 """Distance to a bound, as a share of its range, within which an output is at the bound."""
 
 
+class SampledBounds(ABC):
+    """Bounds of other outputs of a motion than those of Limits: these are at most zero.
+
+    upper: zero, or infinity where there is no bound, shape (1, K). tolerance: of an excess.
+    """
+
+    upper: Array
+    tolerance: float
+    excused: ClassVar[tuple[Excused, ...]] = ()
+
+    @abstractmethod
+    def outputs(self, trajectory: Trajectory, k: Index, s: Array) -> Array:
+        """Them at relative positions s in intervals k, shape (M, 1, K)."""
+
+    @property
+    def lower(self) -> Array:
+        """None."""
+        return np.full_like(self.upper, -np.inf)
+
+    @property
+    def bounded(self) -> npt.NDArray[np.bool_]:
+        """Where there is a bound, (1, K)."""
+        return np.isfinite(self.upper)
+
+    @property
+    def ranges(self) -> Array:
+        """One, the scale of the outputs, (1, K)."""
+        return np.ones_like(self.upper)
+
+    def on(self, nodes: Array) -> tuple[Array, Array]:
+        """Both bounds in every interval, (1, 1, K)."""
+        return self.lower[None], self.upper[None]
+
+    def wider(self, side: int, t: Array) -> Array:
+        """Nothing is excused, (*t.shape, 1, K)."""
+        return np.zeros((*t.shape, *self.upper.shape))
+
+
+Bounds = Limits | SampledBounds
+
+
 @dataclass(frozen=True, eq=False)
 class Excess:
     """Largest excess over each bound in each interval, as a share of its range; negative inside.
@@ -64,7 +109,9 @@ class Excess:
 
 
 def excess_along(
-    trajectory: Trajectory, limits: Limits, refined: npt.NDArray[np.bool_] | bool = True
+    trajectory: Trajectory,
+    limits: Bounds,
+    refined: npt.NDArray[np.bool_] | bool = True,
 ) -> Excess:
     """The extremes of the limited quantities along the interpolant, compared with the limits.
 
@@ -79,7 +126,7 @@ def excess_along(
 
 
 def excess_of(
-    trajectory: Trajectory, limits: Limits, chosen: npt.NDArray[np.bool_]
+    trajectory: Trajectory, limits: Bounds, chosen: npt.NDArray[np.bool_]
 ) -> tuple[Array, Array]:
     """The excess over the lower and upper bounds of chosen outputs, (N, kinds, nv) each.
 
@@ -111,7 +158,10 @@ def excess_of(
 
 
 def _excess_in(
-    intervals: Index, trajectory: Trajectory, limits: Limits, refined: npt.NDArray[np.bool_]
+    intervals: Index,
+    trajectory: Trajectory,
+    limits: Bounds,
+    refined: npt.NDArray[np.bool_],
 ) -> Excess:
     """As `excess_along`, in some intervals."""
     raise_if_late()
@@ -135,7 +185,7 @@ class _Side:
     """
 
     trajectory: Trajectory
-    limits: Limits
+    limits: Bounds
     sign: float
     bound: Array
 
@@ -213,8 +263,10 @@ class _Side:
         return excess[rows, best], at
 
 
-def _outputs(trajectory: Trajectory, k: Index, s: Array, limits: Limits) -> Array:
+def _outputs(trajectory: Trajectory, k: Index, s: Array, limits: Bounds) -> Array:
     """The limited kinds at relative positions s in intervals k, shape (M, kinds, nv)."""
+    if isinstance(limits, SampledBounds):
+        return limits.outputs(trajectory, k, s)
     if len(limits.kinds) == FIRST_KINDS:
         return _stacked(trajectory.sample_intervals(k, s), trajectory.space)
     q, v, a, j = trajectory.jet_intervals(k, s, 3)

@@ -24,7 +24,8 @@ from hovi.errors import InputError, warn
 from hovi.planning.clearance.clearance import Clearance
 from hovi.planning.clearance.distances import Distances
 from hovi.planning.clearance.within_reach import distances_within_reach, with_gaps
-from hovi.planning.conditions.condition import Equation, equation
+from hovi.planning.conditions.asked import asked_at_nodes, bounded_of, checked
+from hovi.planning.conditions.condition import Bounded, Condition, Equation, equation
 from hovi.planning.problem.conserved_momentum import free_fall_contradiction, without_redundancy
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.goals import Via, goal_state
@@ -32,7 +33,11 @@ from hovi.planning.problem.hessian_structure import ActionStructure
 from hovi.planning.problem.limits import Limits, no_limits
 from hovi.planning.problem.notation.goal_turns import turns_to
 from hovi.planning.problem.notation.summaries import ProblemSummary
-from hovi.planning.problem.notation.supported import require_dynamics, require_supported
+from hovi.planning.problem.notation.supported import (
+    require_dynamics,
+    require_free,
+    require_supported,
+)
 from hovi.planning.problem.seams import Hold, ViaPoints, curve_through, holding
 from hovi.planning.problem.torque_moments import TorqueMoments
 from hovi.planning.problem.way_back.end_state import EndState
@@ -64,6 +69,7 @@ class TrajectoryProblem(ProblemSummary):
     start: state at t = 0. goal: state at t = T, a task-space goal, or Periodic.
     limits: bounds along the motion; none if None. via: via points, at nodes of the grid.
     clearance: obstacles and their margin; none if None. time_weight: w of J + w T.
+    conditions: of functions of the motion: see `hovi.Condition`.
     ends: (q, q', ..., q^(k-1)) at the start and at the goal, k arrays of two rows; initial guesses
         in free components.
     free_ends: which of (q, q', ..., q^(k-1)) are free at the start and at the goal, shape
@@ -81,6 +87,7 @@ class TrajectoryProblem(ProblemSummary):
     via: tuple[Via, ...] = ()
     clearance: Clearance | None = None
     time_weight: float = 0.0
+    conditions: Sequence[Condition[Any, Any]] = ()
     ends: tuple[Array, ...] = field(init=False, repr=False)
     free_ends: Mask = field(init=False, repr=False)
     equations: tuple[Equation, ...] = field(init=False, repr=False)
@@ -93,6 +100,7 @@ class TrajectoryProblem(ProblemSummary):
             require_regular(scheme)
         if self.periodic and (self.via or len(self.passive) > 0):
             raise InputError("periodic motions have no via points or passive joints: omit them.")
+        object.__setattr__(self, "conditions", checked(self.conditions, self.coordinates))
         require_supported(self, self.ld.k)
         of, limits = self.ld.lagrangian, self.limits
         if limits is not None and limits.on_torque_rate and isinstance(of, JerkLagrangian):
@@ -116,9 +124,11 @@ class TrajectoryProblem(ProblemSummary):
         last_node = self.grid.intervals, float(self.grid.t[-1])
         equations = [equation(each, *last_node) for each in end.differences]
         unreachable = end.reason or passed.reason
-        object.__setattr__(self, "equations", (*equations, *passed.equations))
+        asked = asked_at_nodes(self.conditions, self.grid)
+        object.__setattr__(self, "equations", (*equations, *passed.equations, *asked))
         object.__setattr__(self, "holds", passed.holds)
         self._set_ends(first, end.state)
+        require_free(asked, self)
         if self.about_robot and not self.periodic and self.ld.k > 1:
             known = self.scene, self.ends, self.free_ends
             unreachable = unreachable or free_fall_contradiction(*known, self.grid.duration)
@@ -167,6 +177,7 @@ class TrajectoryProblem(ProblemSummary):
         limits: Sequence[Limits | None] | None = None,
         via: tuple[Via, ...] = (),
         clearance: Clearance | None = None,
+        conditions: Sequence[Condition[Any, Any]] = (),
     ) -> Self:
         """The problem of one motion in several segments, which share the nodes between them.
 
@@ -183,7 +194,8 @@ class TrajectoryProblem(ProblemSummary):
         if limits is not None:
             none = no_limits(lagrangian.coordinates)
             bounds = Limits.of_segments([none if each is None else each for each in limits], ends)
-        return cls(DiscreteLagrangian(lagrangian, grid), start, goal, bounds, via, clearance)
+        ld = DiscreteLagrangian(lagrangian, grid)
+        return cls(ld, start, goal, bounds, via, clearance, conditions=conditions)
 
     @cached_property
     def structure(self) -> ActionStructure:
@@ -331,14 +343,19 @@ class TrajectoryProblem(ProblemSummary):
         return bool(self.free_ends.any())
 
     @property
+    def bounds(self) -> tuple[Bounded, ...]:
+        """The conditions that hold at all times."""
+        return bounded_of(self.conditions)
+
+    @property
     def has_limits(self) -> bool:
         """Whether there are limits; distances are none."""
         return self.limits is not None and bool(self.limits.bounded.any())
 
     @property
     def limited(self) -> bool:
-        """Whether there are limits or obstacles."""
-        return self.has_limits or self.distances is not None
+        """Whether there are limits, obstacles or conditions at all times."""
+        return self.has_limits or bool(self.bounds) or self.distances is not None
 
     @property
     def distances(self) -> Distances | None:

@@ -38,7 +38,7 @@ def with_limits_again(refined: Solution, limited: Solution) -> Solution | None:
 
 
 def _limits_alone(problem: TrajectoryProblem | None) -> Limits | None:
-    """The limits of a problem without obstacles; None if there are none."""
-    if problem is None or problem.distances is not None or not problem.limited:
+    """The limits of a problem without obstacles and conditions; None if there are none."""
+    if problem is None or problem.distances is not None or problem.bounds or not problem.limited:
         return None
     return problem.limits

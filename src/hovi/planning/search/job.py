@@ -17,6 +17,7 @@ from hovi.discrete.state import State
 from hovi.discrete.trajectory import Trajectory
 from hovi.effects import Effect
 from hovi.errors import ChartError
+from hovi.planning.conditions.asked import times_of
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.goals import Via, held_goal, is_isolated
 from hovi.planning.problem.limits import Limits, as_limits
@@ -107,10 +108,15 @@ class Job:
 
     @property
     def node_times(self) -> list[float]:
-        """The times at which its grids have nodes: of via points and ends of segments, in [s]."""
+        """The times at which its grids have nodes, in [s].
+
+        Those of via points, of conditions at given times, and of the ends of segments.
+        """
         T, ends = self.grid.duration, self.ends
         between = [
-            each.time for each in self.via if all(abs(each.time - end) > 1e-9 * T for end in ends)
+            time
+            for time in stops_of(self.options)
+            if all(abs(time - end) > 1e-9 * T for end in (*ends, T))
         ]
         return sorted([*between, *ends])
 
@@ -185,7 +191,8 @@ class Job:
         ld = DiscreteLagrangian(self.lagrangian(), self.grid)
         clearance, weight = self.options.clearance, self.options.time_weight
         ends = self.start, self.goal
-        return TrajectoryProblem(ld, *ends, self.limits, self.via, clearance, weight)
+        asked = self.options.conditions
+        return TrajectoryProblem(ld, *ends, self.limits, self.via, clearance, weight, asked)
 
     def __getstate__(self) -> dict[str, Any]:
         """The state without the problem, which worker processes build, and without the guess."""
@@ -230,11 +237,17 @@ def grid_of(T: float, options: PlanOptions, scene: Scene, free: bool) -> Grid:
         grid = guess.grid.stretched(T)
     else:
         limited = as_limits(scene.robot, options.limits).bounded.any()
-        kinks = limited or options.clearance.wanted or options.via
+        kinks = limited or options.clearance.wanted or options.via or options.conditions
         few = options.starts == 1 and not free and not isinstance(guess, Trajectory)
         number, order = options.interval_count, scene.order
         grid = first_grid(T, number, not kinks, more_points=not few, order=order)
-    return grid.with_nodes(sorted(each.time for each in options.via), options.intervals is None)
+    stops = [time for time in stops_of(options) if abs(time - T) > 1e-9 * T]
+    return grid.with_nodes(stops, options.intervals is None)
+
+
+def stops_of(options: PlanOptions) -> list[float]:
+    """The times of via points and of conditions at given times, ascending, in [s]."""
+    return sorted({*(each.time for each in options.via), *times_of(options.conditions)})
 
 
 def _is_first_grid(grid: Grid, options: PlanOptions, order: int) -> bool:
@@ -243,7 +256,7 @@ def _is_first_grid(grid: Grid, options: PlanOptions, order: int) -> bool:
     The grid has Galerkin tables only, and more intervals than the first grid would have, up to
     MAX_GUESS_INTERVALS; neither intervals nor via points ask for others. order: of the Lagrangian.
     """
-    if options.intervals is not None or options.via or grid.order != order:
+    if options.intervals is not None or stops_of(options) or grid.order != order:
         return False
     refinable = all(is_galerkin(scheme) for scheme, _ in grid.groups)
     return refinable and options.interval_count < grid.intervals <= MAX_GUESS_INTERVALS

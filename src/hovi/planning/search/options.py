@@ -14,6 +14,8 @@ from hovi.discrete.guess import require_guess
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError, expect, nearest
 from hovi.planning.clearance.clearance import DEFAULT_MARGIN, Clearance
+from hovi.planning.conditions.asked import as_conditions
+from hovi.planning.conditions.condition import Condition
 from hovi.planning.obstacles.obstacle import Obstacle
 from hovi.planning.obstacles.preparation import prepared_within
 from hovi.planning.problem.goals import Via
@@ -53,8 +55,8 @@ INTERVALS_TWICE = "`intervals` and `scheme.intervals` are the same: leave one of
 MAX_INTERVALS = 1_000_000
 """Maximum number of intervals that may be requested."""
 _CHECKED_HERE = (
-    *("via", "scheme", "intervals", "starts", "seed", "obstacles", "grasped", "margin"),
-    *("max_iterations", "time_limit", "processes"),
+    *("via", "conditions", "scheme", "intervals", "starts", "seed", "obstacles", "grasped"),
+    *("margin", "max_iterations", "time_limit", "processes"),
 )
 """Options whose own checks say more than their annotations."""
 _EXCLUSIVE = "scheme", "tolerance"
@@ -87,6 +89,12 @@ class PlanOptions:
     )
     via: Sequence[Via] = option(
         (), "goals that the motion meets at given times: Via, or tables as in a scene file."
+    )
+    conditions: Sequence[Condition[Any, Any]] = option(
+        (),
+        "hovi.Condition: bounds of functions of q, v, a, tau and t along the whole motion, such as "
+        'hovi.Condition("tau * v", hovi.Between(-80, 80), name="power"), or their values at given '
+        "times.",
     )
     scheme: str | Scheme | None = option(
         None,
@@ -220,6 +228,7 @@ class PlanOptions:
         if not isinstance(via, Sequence) or isinstance(via, str):
             raise InputError(f"via must be a list of hovi.Via(time, goal), got {via!r}.")
         object.__setattr__(self, "via", tuple(as_via(each, i) for i, each in enumerate(via)))
+        object.__setattr__(self, "conditions", as_conditions(self.conditions))
         if not isinstance(self.grasped, tuple) or self.grasped:
             from hovi.planning.obstacles.grasped import as_grasped  # 10 ms
 
@@ -271,7 +280,9 @@ class PlanOptions:
 
     @property
     def _limited(self) -> bool:
-        """Whether a motion has limits, between which more points leave it less room."""
+        """Whether a motion has bounds, between which more points leave it less room."""
+        if self.conditions:
+            return True
         if isinstance(self.limits, Limits):
             return bool(self.limits.bounded.any())
         return self.limits != "none"

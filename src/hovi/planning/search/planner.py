@@ -17,6 +17,8 @@ from hovi.errors import InputError, ModelError, SceneError, expect, warn
 from hovi.planning.clearance.distances import distances_between
 from hovi.planning.clearance.hull_overlaps import HullOverlap, hull_overlaps, met_sentence
 from hovi.planning.clearance.self_collisions import not_looked_at, pairs_left_out
+from hovi.planning.conditions.asked import checked
+from hovi.planning.conditions.places import AtTimes
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.goals import Via
 from hovi.planning.problem.notation.ends import End, as_end
@@ -346,6 +348,12 @@ def _time(
         return None, T
     if options.via:
         raise InputError("via points need a fixed duration: give it as one number.")
+    for each in checked(options.conditions, scene.robot):
+        if isinstance(each.where, AtTimes) or each.timed:
+            raise InputError(
+                f"condition {each.name!r} depends on time, which a free duration does not allow; "
+                "give the duration as one number."
+            )
     moving = [each.name for each in options.clearance.obstacles if each.motion is not None]
     if moving:
         raise InputError(

@@ -15,7 +15,7 @@ from hovi.errors import InputError, warn
 from hovi.planning.problem.limits import Limits
 from hovi.planning.problem.seams import Seam
 from hovi.planning.refinement.adaptive import MAX_FIRST_INTERVALS, first_grid
-from hovi.planning.search.job import Acting, Job, Part
+from hovi.planning.search.job import Acting, Job, Part, stops_of
 from hovi.planning.search.options import PlanOptions
 from hovi.planning.sequence.branches import End, Leg, chosen_branches
 from hovi.planning.sequence.segment import Segment, names_of
@@ -68,7 +68,7 @@ def job_of(
     if any(each.limits is not None for each in segments):
         job = job.with_options(limits=Limits.of_segments(limits, ends[:-1]))
     job = job.with_options(via=(*seams, *options.via))
-    if options.via:
+    if stops_of(options):
         job = job.on(grid.with_nodes(job.node_times, options.intervals is None))
     return job.on(job.graded(job.grid))
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from hovi.discrete.grid import DiscretePath
 from hovi.optimize.ended import Ended, Reason
-from hovi.planning.conditions.condition import describe, is_spurious
+from hovi.planning.conditions.condition import describe, is_spurious, whose
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.multipliers import Multipliers, Residuals, largest_residual
@@ -159,8 +159,8 @@ def unmet_sentence(problem: TrajectoryProblem, path: DiscretePath, residuals: Re
         )
     worst = largest_residual(problem, residuals.nodes)[0]
     return (
-        f"the goal at t = {worst.where.time:.4g} s cannot be met: {describe(worst, path)}; change "
-        "the goal, increase the duration or try another initial guess"
+        f"{whose(worst)} at t = {worst.where.time:.4g} s cannot be met: {describe(worst, path)}; "
+        "change the goal, increase the duration or try another initial guess"
     )
 
 

@@ -20,12 +20,13 @@ from hovi.optimize.barrier import Bounds
 from hovi.optimize.bounded_objective import BoundedObjective, Refinement
 from hovi.optimize.ended import Outputs
 from hovi.optimize.quadratic_model import QuadraticModel
+from hovi.planning.conditions.function import Points
 from hovi.planning.problem.limits import Limits, limited_columns
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.action_objective import ActionObjective, LinearAlgebra
-from hovi.planning.solver.clearance_outputs import PointOutputs
 from hovi.planning.solver.limits.limit_rows import LimitRows, push_rows
 from hovi.planning.solver.multipliers import Multipliers
+from hovi.planning.solver.point_outputs import PointOutputs
 from hovi.scene.lagrangian import PointTerms
 
 Array = npt.NDArray[np.float64]
@@ -34,8 +35,8 @@ Array = npt.NDArray[np.float64]
 class BoundedAction(BoundedObjective[DiscretePath]):
     """The discrete action, with (q, v, a, tau), or more, bounded at the quadrature points.
 
-    What `rows` bound is bounded at all times instead. Further outputs y(q) >= 0, such as distances
-    to obstacles, follow in the last columns.
+    What `rows` bound is bounded at all times instead. Further outputs of the motion, such as
+    distances to obstacles and the values of conditions, follow in the last columns.
 
     problem: the trajectory problem.
     limits: the bounds.
@@ -83,6 +84,7 @@ class BoundedAction(BoundedObjective[DiscretePath]):
         self._with_rows()
         self._predicted: list[Array] | None = None
         self._jacobian = np.zeros((0, 0, 0))
+        self._torque_weights: Array | None = None
 
     def _with_rows(self) -> None:
         """The bounds of the outputs at the points, then those of the rows."""
@@ -110,7 +112,7 @@ class BoundedAction(BoundedObjective[DiscretePath]):
         else:
             y = self._scaled(self._at_all_points(x, outputs))
         if self.more is not None:
-            y = np.concatenate([y, self.more.values(self._configurations(x))], axis=1)
+            y = np.concatenate([y, self.more.values(self._motion_at_points(x, outputs))], axis=1)
         return y.ravel() if self.rows is None else np.append(y, self.rows.values(x))
 
     def _at_all_points(self, x: DiscretePath, outputs: list[Array]) -> Array:
@@ -139,6 +141,7 @@ class BoundedAction(BoundedObjective[DiscretePath]):
             curvatures.append(self._slope(x, i) + force[part, k:])
         if self.more is not None:
             terms = self._with_more(x, terms, sigma_at, rho_at, multipliers_at)
+            curvatures = self._with_torque_weights(curvatures)
         model = self.action.model_with(x, curvatures, terms, self._row_terms(sigma, rho))
         return self._under_conditions(x, model)
 
@@ -189,17 +192,26 @@ class BoundedAction(BoundedObjective[DiscretePath]):
     ) -> list[PointTerms]:
         """The terms with those of the further outputs added."""
         assert self.more is not None
-        first, nv = len(self.columns), self.lagrangian.nv
-        J, curve = self.more.expand(self._configurations(x), multipliers[:, first:])
-        self._jacobian = J
-        slope = np.matmul(rho[:, None, first:], J)[:, 0]  # (P, nv)
+        first, at = len(self.columns), self._motion_at_points(x, self.action.outputs(x))
+        J, curve, self._torque_weights = self.more.expand(at, multipliers[:, first:])
+        self._jacobian, m = J, J.shape[2]
+        slope = np.matmul(rho[:, None, first:], J)[:, 0]  # (P, m)
         curve = curve + np.matmul(J.transpose(0, 2, 1), sigma[:, first:, None] * J)
         for term, part in zip(terms, self._parts, strict=True):
-            term.jet_gradient[:, :nv] += slope[part]
+            term.jet_gradient[:, :m] += slope[part]
         return [
-            dataclasses.replace(term, configuration_weight=curve[part])
+            dataclasses.replace(term, leading_weight=curve[part])
             for term, part in zip(terms, self._parts, strict=True)
         ]
+
+    def _with_torque_weights(self, curvatures: list[Array]) -> list[Array]:
+        """The weights of the outputs' curvature with those of torques in the further outputs."""
+        more = self._torque_weights
+        if more is None:
+            return curvatures
+        others = self._size - self._jet_size - more.shape[1]  # such as torque rates
+        padded = np.pad(more, ((0, 0), (0, others)))
+        return [each + padded[part] for each, part in zip(curvatures, self._parts, strict=True)]
 
     def push(self, step: Array, model: QuadraticModel) -> Array:
         """First-order change of the bounded outputs, shape (R,)."""
@@ -214,8 +226,8 @@ class BoundedAction(BoundedObjective[DiscretePath]):
         changed = np.concatenate(parts)
         dy = changed[:, self.columns] * self._inverse_ranges
         if self.more is not None:
-            dq = changed[:, : self.lagrangian.nv, None]
-            dy = np.concatenate([dy, np.matmul(self._jacobian, dq)[:, :, 0]], axis=1)
+            dx = changed[:, : self._jacobian.shape[2], None]
+            dy = np.concatenate([dy, np.matmul(self._jacobian, dx)[:, :, 0]], axis=1)
         if self.rows is None or self.rows.size == 0:
             return np.asarray(dy.ravel())
         return np.append(dy, push_rows(self.rows, self._row_columns, columns))
@@ -265,12 +277,12 @@ class BoundedAction(BoundedObjective[DiscretePath]):
 
     def _point_gradient(self, forces: Array, jacobian: Array, part: slice) -> Array:
         """sum forces dy / d(q, v, ...) at the points of a batch, (P, k + 1, nv)."""
-        k, nv = self._jet_size, self.lagrangian.nv
+        k, nv, m = self._jet_size, self.lagrangian.nv, self._jacobian.shape[2]
         slope = self._unscaled(forces, 1)
         gradient = slope[:, :k] + np.matmul(slope[:, None, k:], jacobian)[:, 0]
         if self.more is not None:
             further = forces[:, None, len(self.columns) :]
-            gradient[:, :nv] += np.matmul(further, self._jacobian[part])[:, 0]
+            gradient[:, :m] += np.matmul(further, self._jacobian[part])[:, 0]
         return np.asarray(gradient.reshape(len(gradient), -1, nv))
 
     def accept(self, step: Array, model: QuadraticModel) -> None:
@@ -327,10 +339,11 @@ class BoundedAction(BoundedObjective[DiscretePath]):
         table = np.ascontiguousarray(batch.tables[self.action.coordinates])
         return table, batch.contraction_weights, np.ascontiguousarray(batch.h)
 
-    def _configurations(self, x: DiscretePath) -> Array:
-        """q at all quadrature points, (P, nq), as the further outputs take it."""
-        q = np.concatenate([jet[0] for jet in self.action.jets(x)])
-        return q if self.more is None else self.more.at(q, np.concatenate(self.ld.point_times))
+    def _motion_at_points(self, x: DiscretePath, outputs: list[Array]) -> Points:
+        """The motion at all quadrature points; without torques where there are none."""
+        q, v, a = (np.concatenate([jet[i] for jet in self.action.jets(x)]) for i in range(3))
+        tau = np.ascontiguousarray(np.concatenate(outputs)[:, : self.lagrangian.nv])
+        return Points(q, v, np.concatenate(self.ld.point_times), a, tau)
 
     def _slope(self, x: DiscretePath, batch: int) -> Array:
         """R y as predicted, or at x before the first step."""
@@ -371,15 +384,17 @@ class BoundedAction(BoundedObjective[DiscretePath]):
         intervals = np.concatenate(self.ld.point_intervals)
         weights = np.concatenate(self.ld.point_weights)[:, None]
         lower, upper = (self._rows_of(bound) for bound in self.limits.on(self.problem.grid.t))
-        if size > 0:
-            lower = np.pad(lower, ((0, 0), (0, size)))
-            upper = np.pad(upper, ((0, 0), (0, size)), constant_values=np.inf)
         if len(lower) > 1:  # they differ between segments
             lower, upper = lower[intervals], upper[intervals]
         if self.limits.excused:
-            lower, upper = lower - self._wider(-1, size), upper + self._wider(1, size)
+            lower, upper = lower - self._wider(-1), upper + self._wider(1)
         shape = (len(intervals), lower.shape[1])
-        lower, upper, weights = (np.broadcast_to(x, shape) for x in (lower, upper, weights))
+        lower, upper = (np.broadcast_to(x, shape) for x in (lower, upper))
+        if self.more is not None:
+            low, high = self.more.bounds(np.concatenate(self.ld.point_times))
+            lower = np.concatenate([lower, low], axis=1)
+            upper = np.concatenate([upper, high], axis=1)
+        weights = np.broadcast_to(weights, lower.shape)
         if margins is None or not margins.any():
             return lower, upper, weights
         tightening = margins.reshape(2, len(margins[0]), -1)
@@ -388,11 +403,10 @@ class BoundedAction(BoundedObjective[DiscretePath]):
         tightening = tightening[:, :, chosen][:, intervals]
         return lower + tightening[0], upper - tightening[1], weights
 
-    def _wider(self, side: int, more: int) -> Array:
-        """By how much bounds of a side are wider at the points, (P, K). more: further outputs."""
+    def _wider(self, side: int) -> Array:
+        """By how much bounds of a side are wider at the points, (P, K) without further outputs."""
         wider = self.limits.wider(side, np.concatenate(self.ld.point_times))
-        chosen = wider.reshape(len(wider), -1)[:, self._bounded] * self._inverse_ranges
-        return np.pad(chosen, ((0, 0), (0, more)))
+        return np.asarray(wider.reshape(len(wider), -1)[:, self._bounded] * self._inverse_ranges)
 
     def _rows_of(self, bound: Array) -> Array:
         """Bounds (N or 1, kinds, nv) in scaled outputs, shape (N or 1, K)."""

@@ -1,8 +1,7 @@
-"""Outputs y(q) >= 0 at the quadrature points, such as distances."""
+"""Distances as outputs at the quadrature points."""
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Sequence
 
 import numpy as np
@@ -10,6 +9,8 @@ import numpy.typing as npt
 
 from hovi.planning.clearance.clearance import DISTANCE_SCALE
 from hovi.planning.clearance.distances import Distances
+from hovi.planning.conditions.function import Points
+from hovi.planning.solver.point_outputs import ExpandedOutputs, PointOutputs
 
 Array = npt.NDArray[np.float64]
 
@@ -17,31 +18,6 @@ EXTRA_CLEARANCE = 5e-4
 """Clearance at the points beyond the margin, in DISTANCE_SCALE: 0.05 mm for the motion between."""
 CUTOFF = 1.0, 3.0
 """Excess over the margin, in DISTANCE_SCALE, from which outputs level off, and are constant."""
-
-
-class PointOutputs(ABC):
-    """y(q) >= 0, dimensionless, with its derivatives in the tangent space."""
-
-    @property
-    @abstractmethod
-    def size(self) -> int:
-        """K, the number of outputs at a point."""
-
-    def at(self, q: Array, t: Array) -> Array:
-        """What the outputs take for configurations (P, nq) at times (P,): themselves by default."""
-        return q
-
-    @abstractmethod
-    def values(self, q: Array) -> Array:
-        """y at configurations (P, nq), shape (P, K)."""
-
-    @abstractmethod
-    def expand(self, q: Array, force: Array) -> tuple[Array, Array]:
-        """Derivatives of y in q along `integrate`.
-
-        force: weights of the outputs' curvature, shape (P, K).
-        Returns y' (P, K, nv) and sum_k force_k y''_k (P, nv, nv).
-        """
 
 
 class ClearanceOutputs(PointOutputs):
@@ -62,10 +38,6 @@ class ClearanceOutputs(PointOutputs):
         """The outputs of some of the pairs, by their numbers."""
         return ClearanceOutputs(self.distances.restricted(pairs), self.least)
 
-    def at(self, q: Array, t: Array) -> Array:
-        """With times where obstacles move."""
-        return self.distances.at(q, t)
-
     @property
     def size(self) -> int:
         """Number of pairs."""
@@ -76,19 +48,20 @@ class ClearanceOutputs(PointOutputs):
         """Distance beyond which an output is constant, in [m]."""
         return self.least + CUTOFF[1] * DISTANCE_SCALE
 
-    def values(self, q: Array) -> Array:
+    def values(self, at: Points) -> Array:
         """y, shape (P, K)."""
-        return saturated(self._excess(q))[0]
+        return saturated(self._excess(self.distances.at(at.q, at.t)))[0]
 
-    def expand(self, q: Array, force: Array) -> tuple[Array, Array]:
-        """Derivatives and curvature: see PointOutputs."""
+    def expand(self, at: Points, force: Array) -> ExpandedOutputs:
+        """Derivatives in q: see PointOutputs."""
+        q = self.distances.at(at.q, at.t)
         _, slope, bend = saturated(self._excess(q))
         weights = force * slope / DISTANCE_SCALE
         _, jacobian, curvature = self.distances.expansion(q, weights, self.reach)
         jacobian /= DISTANCE_SCALE
         bending = (force * bend)[:, :, None] * jacobian
         curvature += np.matmul(jacobian.transpose(0, 2, 1), bending)
-        return slope[:, :, None] * jacobian, curvature
+        return ExpandedOutputs(slope[:, :, None] * jacobian, curvature)
 
     def _excess(self, q: Array) -> Array:
         """Distances beyond the least one, in DISTANCE_SCALE; those of the last points are kept."""

@@ -145,7 +145,7 @@ class ConstrainedAction(EqualityObjective[DiscretePath]):
                 torque.append(self.moments.spread(y[first:last], i))
                 first = last
         for each in self.problem.equations:
-            last = first + each.function.size
+            last = first + each.y.size
             nodes.append(self.node_scale * y[first:last])
             first = last
         return torque, nodes

@@ -74,7 +74,7 @@ class Multipliers:
         lagrangian = problem.ld.lagrangian
         outputs = len(lagrangian.output_weight)
         torque = [np.zeros((len(t), outputs)) for t in problem.ld.point_times]
-        nodes = [np.zeros(each.function.size) for each in problem.equations]
+        nodes = [np.zeros(each.y.size) for each in problem.equations]
         jet_size = (lagrangian.order + 1) * lagrangian.nv
         return cls(torque, nodes, torque_penalty, node_penalty, jet_size)
 

@@ -38,6 +38,7 @@ class ProblemSummary(Summarized):
     limits: Any
     via: tuple[Any, ...]
     clearance: Any
+    conditions: Any
 
     @property
     def scenes(self) -> tuple[Any, ...]:
@@ -56,6 +57,8 @@ class ProblemSummary(Summarized):
             rows.append(("via", f"{len(self.via)} points"))
         if self.clearance is not None and self.clearance.wanted:
             rows.append(("obstacles", str(len(self.clearance.obstacles))))
+        if self.conditions:
+            rows.append(("conditions", ", ".join(each.name for each in self.conditions)))
         return Summary("TrajectoryProblem", tuple(rows))
 
 

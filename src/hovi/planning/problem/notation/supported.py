@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Any
+
 from hovi.errors import InputError
+from hovi.planning.conditions.condition import Equation
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.notation.summaries import ProblemSummary
 from hovi.scene.scene import require_plannable
@@ -18,6 +22,7 @@ def require_supported(problem: ProblemSummary, order: int) -> None:
         "limits": limits is not None and bool(limits.bounded.any()),
         "obstacles": problem.clearance is not None and problem.clearance.wanted,
         "via points": bool(problem.via),
+        "conditions": bool(problem.conditions),
         "goals of frames": isinstance(problem.goal, FrameGoal),
     }
     named = [what for what, is_wanted in wanted.items() if is_wanted]
@@ -28,6 +33,24 @@ def require_supported(problem: ProblemSummary, order: int) -> None:
         )
     if limits is not None:
         limits.require_order(order)
+    if any("tau" in each.y.needs for each in problem.conditions) and not problem.scenes:
+        raise InputError(
+            "a condition on torques needs a Lagrangian of a scene, and this one is about no robot: "
+            "leave it out, or name q, v, a and t alone."
+        )
+
+
+def require_free(asked: Sequence[Equation], problem: Any) -> None:
+    """Raise InputError for equations of conditions at a node whose state is given."""
+    last = problem.grid.intervals
+    for each in asked:
+        given = each.where.node == last and not problem.free_ends[1].any()
+        if given or problem.periodic:
+            what = "of a periodic motion" if problem.periodic else "where the goal gives the state"
+            raise InputError(
+                f"condition {each.name!r} is asked at t = {each.where.time:g} s {what}: leave it "
+                "out, or leave something free there."
+            )
 
 
 def require_dynamics(problem: ProblemSummary) -> None:
@@ -40,5 +63,6 @@ def needs_torques(problem: ProblemSummary) -> bool:
     """Whether torques are part of the cost, are bounded, or vanish at passive joints."""
     limits = problem.limits
     bounded = limits is not None and limits.on_torques
+    bounded = bounded or any("tau" in each.y.needs for each in problem.conditions)
     passive = any(scene.passive for scene in problem.scenes)
     return bounded or passive or problem.ld.lagrangian.needs_torques

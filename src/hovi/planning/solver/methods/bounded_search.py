@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from hovi.discrete.grid import DiscretePath
 from hovi.discrete.instants import Instants
+from hovi.discrete.trajectory import Trajectory
 from hovi.optimize.banded_model import BandModel
 from hovi.optimize.barrier import INITIAL_MARGIN, WARM_START_MARGIN, Barrier
 from hovi.optimize.bordered_model import EquationModel
@@ -39,6 +40,8 @@ from hovi.planning.solver.augmented_lagrangian_rounds import (
 from hovi.planning.solver.bounded_action import BoundedAction
 from hovi.planning.solver.central_path import CentralPath
 from hovi.planning.solver.clearance_outputs import EXTRA_CLEARANCE, ClearanceOutputs
+from hovi.planning.solver.condition_excess import ConditionBounds
+from hovi.planning.solver.condition_outputs import ConditionOutputs
 from hovi.planning.solver.limits.graded_parts import GivenEnds
 from hovi.planning.solver.limits.limit_rows import LimitRows
 from hovi.planning.solver.limits.row_forces import forces_of, joined
@@ -46,6 +49,7 @@ from hovi.planning.solver.methods.method import Report
 from hovi.planning.solver.multipliers import Multipliers
 from hovi.planning.solver.near.clearance_rows import ClearanceRows
 from hovi.planning.solver.near.cleared_action import ClearedAction
+from hovi.planning.solver.point_outputs import joint_outputs
 from hovi.scene.lagrangian import PointTerms
 from hovi.system.dataclass import dataclass
 from hovi.system.deadline import Deadline, raise_if_late
@@ -76,7 +80,7 @@ class BoundedSearch:
     guess: the initial guess, on the problem's grid.
     iterations: steps of all solves.
     margins: share of its range by which each bound is tightened in each interval, shape
-        (2, N, kinds nv + pairs). clearance: bounded distances, or None.
+        (2, N, kinds nv + pairs + values of conditions). clearance: bounded distances, or None.
     tightened: the margins before the last tightening and the excess then, if there was one on this
         grid.
     multipliers, unmet: of the constraints, and why they cannot be met, or "".
@@ -135,9 +139,10 @@ class BoundedSearch:
         return self.least_distance + EXTRA_CLEARANCE * DISTANCE_SCALE
 
     def no_margins(self) -> Array:
-        """Zero margins, shape (2, N, kinds nv + pairs)."""
-        pairs = 0 if self.clearance is None else self.clearance.size
-        return np.zeros((2, self.problem.grid.intervals, self.limits.lower.size + pairs))
+        """Zero margins, shape (2, N, kinds nv + pairs + values of conditions)."""
+        more = sum(each.y.size for each in self.problem.bounds)
+        more += 0 if self.clearance is None else self.clearance.size
+        return np.zeros((2, self.problem.grid.intervals, self.limits.lower.size + more))
 
     def coarse_rows(self) -> LimitRows:
         """Limits at all times, by few control points."""
@@ -177,14 +182,16 @@ class BoundedSearch:
         return objective
 
     def _objective(self, known: Multipliers | None, algebra: LinearAlgebra | None) -> BoundedAction:
+        conditions = ConditionOutputs(self.problem) if self.problem.bounds else None
+        more = joint_outputs(self.clearance, conditions)
         if self.near is not None:
-            common = self.problem, self.limits, self.margins, algebra, known
+            common = self.problem, self.limits, self.margins, algebra, known, more
             cleared = ClearedAction(*common, self.rows, self.near)
             cleared.exact = self.along is not None and self.level is None  # of other ends
             cleared.radii = (BoundedAction if self.at_level else ClearedAction).radii
             return cleared
         return BoundedAction(
-            self.problem, self.limits, self.margins, algebra, known, self.clearance, self.rows
+            self.problem, self.limits, self.margins, algebra, known, more, self.rows
         )
 
     def central_path(self, ended: Bounded) -> CentralPath:
@@ -358,19 +365,26 @@ class BoundedSearch:
         return model.negative_eigenvalues() if isinstance(model, MergeTreeModel) else -1
 
     def excess(self, path: DiscretePath) -> Array:
-        """Excess over lower and upper bounds in every interval, shape (2, N, kinds nv + pairs).
+        """Excess over lower and upper bounds in every interval, shaped as `no_margins`.
 
         -inf for what rows bound, which holds by construction.
         """
         trajectory = self.problem.trajectory(path)
         both = excess_of(trajectory, self.limits, self.rows.of.others(self.limits))
-        sides = np.stack(both).reshape(2, len(both[0]), -1)
-        if self.clearance is None:
-            return sides
-        least = self.least_distance
-        approach = approach_along(trajectory, self.clearance.distances, least)
-        short = (least - approach.distance) / DISTANCE_SCALE
-        return np.concatenate([sides, np.stack([short, np.full_like(short, -np.inf)])], axis=2)
+        sides = [np.stack(both).reshape(2, len(both[0]), -1)]
+        if self.clearance is not None:
+            least = self.least_distance
+            approach = approach_along(trajectory, self.clearance.distances, least)
+            short = (least - approach.distance) / DISTANCE_SCALE
+            sides.append(np.stack([short, np.full_like(short, -np.inf)]))
+        tolerance = self.limits.tolerance
+        sides += [ConditionBounds(x).excess(trajectory, tolerance) for x in self.problem.bounds]
+        return np.concatenate(sides, axis=2) if len(sides) > 1 else sides[0]
+
+    def _worst_condition(self, trajectory: Trajectory) -> tuple[float, str]:
+        """The largest excess of a condition, as a share of its scale, and what it is."""
+        found = [ConditionBounds(each).worst(trajectory) for each in self.problem.bounds]
+        return max(found, default=(0.0, ""))
 
     def too_close(self, path: DiscretePath) -> str:
         """Which pair comes closer than the margin where there are rows of distances; "" if none."""
@@ -385,10 +399,14 @@ class BoundedSearch:
         return approach_sentence(trajectory, some, approach_along(trajectory, some, least), least)
 
     def worst(self, path: DiscretePath) -> str:
-        """The limit or distance that is violated most: joint or pair, and time."""
+        """The limit, distance or condition that is violated most: what, and when."""
         trajectory = self.problem.trajectory(path)
+        excess, clause = self._worst_condition(trajectory)
+        if excess > excess_along(trajectory, self.limits, refined=False).worst:
+            return clause
         if self.clearance is not None:
-            short = self.excess(path)[:, :, self.limits.lower.size :].max()
+            first = self.limits.lower.size
+            short = self.excess(path)[:, :, first : first + self.clearance.size].max()
             if short >= excess_along(trajectory, self.limits, refined=False).worst:
                 distances, least = self.clearance.distances, self.least_distance
                 approach = approach_along(trajectory, distances, least)

@@ -17,6 +17,7 @@ import numpy.typing as npt
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import DiscretePath, Grid
 from hovi.discrete.state import Periodic, State
+from hovi.planning.conditions.asked import times_of
 from hovi.planning.problem.limits import Limits
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.problem.seams import Hold
@@ -55,7 +56,8 @@ def legs_of(problem: TrajectoryProblem) -> list[Leg]:
     """
     distances, of = problem.distances, problem.ld.lagrangian
     held = {each.node: each for each in problem.holds if each.fixed[1].all()}
-    timed = any(each.timed for each in _parts(of))
+    timed = any(each.timed for each in (*_parts(of), *problem.bounds))
+    timed = timed or bool(times_of(problem.conditions))
     moving = distances is not None and bool(distances.paths)
     if not held or timed or moving or isinstance(problem.goal, Periodic):
         return []
@@ -93,7 +95,8 @@ def _between(
         if first < whole.node_at(each.time) < last
     )
     limits = None if problem.limits is None else _limits(problem.limits, begin, end)
-    return TrajectoryProblem(ld, start, goal, limits, via, problem.clearance)
+    asked = problem.conditions
+    return TrajectoryProblem(ld, start, goal, limits, via, problem.clearance, conditions=asked)
 
 
 def _parts(of: Lagrangian) -> Sequence[Lagrangian]:

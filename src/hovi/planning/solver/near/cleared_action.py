@@ -23,6 +23,7 @@ from hovi.planning.solver.multipliers import Multipliers
 from hovi.planning.solver.near.clearance_rows import ClearanceRows
 from hovi.planning.solver.near.expanded_rows import ExpandedRows
 from hovi.planning.solver.near.recent_paths import RecentPaths
+from hovi.planning.solver.point_outputs import PointOutputs
 from hovi.scene.lagrangian import PointTerms
 
 Array = npt.NDArray[np.float64]
@@ -54,13 +55,14 @@ class ClearedAction(BoundedAction):
         margins: Array | None,
         algebra: LinearAlgebra | None,
         multipliers: Multipliers | None,
+        more: PointOutputs | None,
         rows: LimitRows,
         near: ClearanceRows,
     ) -> None:
         self.near = near
         near.stand_behind(rows)
         self._limit_outputs = RecentPaths[Array]()
-        super().__init__(problem, limits, margins, algebra, multipliers, None, rows)
+        super().__init__(problem, limits, margins, algebra, multipliers, more, rows)
         self._near: ExpandedRows | None = None
         self._force = np.zeros(0)
 

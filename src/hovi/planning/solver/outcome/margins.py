@@ -24,17 +24,20 @@ class Margins:
         for a plan without either.
     segments: of a sequence, the margins to the limits of each segment, by its name.
     nearest_pair: the link and the obstacle, or the two links, at that distance; None without one.
+    conditions: the margin to the bounds of each condition, by its name, as a fraction of its scale.
     """
 
     limits: LimitMargins | None = None
     distance: float | None = None
     segments: Mapping[str, LimitMargins] = field(default_factory=dict)
     nearest_pair: str | None = None
+    conditions: Mapping[str, float] = field(default_factory=dict)
 
     def __str__(self) -> str:
         """The tightest limit of the motion and of each segment, and the least distance."""
         known = ["no limits" if self.limits is None else str(self.limits)]
         known += [f"{name!r}: {each}" for name, each in self.segments.items()]
+        known += [f"{name!r}: margin {100 * x:.3g} %" for name, x in self.conditions.items()]
         if self.distance is not None:
             known.append(f"least distance {self.distance:.4g} m, of {self.nearest_pair}")
         return "\n".join(known)

@@ -7,7 +7,9 @@ the whole motion has: a horizon that moves keeps its grid.
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -17,6 +19,9 @@ from hovi.discrete.path_on_grid import path_on_grid
 from hovi.discrete.state import State
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError
+from hovi.planning.conditions.asked import times_of
+from hovi.planning.conditions.condition import Condition
+from hovi.planning.conditions.places import AtTimes
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.goals import Via
 from hovi.planning.problem.problem import TrajectoryProblem
@@ -72,14 +77,26 @@ class Shift:
             for each in self._via
         )
         ld = DiscreteLagrangian(self.problem.ld.lagrangian, self.grid)
-        return dataclasses.replace(self.problem, ld=ld, start=start, goal=goal, via=via)
+        later = tuple(filter(None, map(self._later, self.problem.conditions)))
+        return dataclasses.replace(
+            self.problem, ld=ld, start=start, goal=goal, via=via, conditions=later
+        )
+
+    def _later(self, given: Condition[Any, Any]) -> Condition[Any, Any] | None:
+        """A condition with its times by the new clock; None where all of them have passed."""
+        if not isinstance(given.where, AtTimes):
+            return given
+        left = [(time - self.elapsed) * self._ratio for time in self._left(times_of([given]))]
+        return dataclasses.replace(given, where=AtTimes(left)) if left else None
 
     @cached_property
     def grid(self) -> Grid:
         """The grid of what is left."""
         if self._ratio == 1.0:
             return self._remainder.grid
-        times = [(each.time - self.elapsed) * self._ratio for each in self._via]
+        T = self.problem.grid.duration
+        stops = {each.time for each in self._via} | set(self._left(times_of(self._asked)))
+        times = [(time - self.elapsed) * self._ratio for time in sorted(stops - {T})]
         return self.problem.grid.stretched(self.duration).with_nodes(times)
 
     def path(self, path: DiscretePath) -> DiscretePath:
@@ -137,14 +154,23 @@ class Shift:
     @cached_property
     def _remainder(self) -> Remainder:
         grid = self.problem.grid
-        nodes = tuple(grid.node_at(via.time) for via in self.problem.via)
+        stops = *(via.time for via in self.problem.via), *times_of(self._asked)
+        nodes = tuple(grid.node_at(time) for time in stops)
         return Remainder.after(grid, self.elapsed, nodes)
 
     @property
     def _via(self) -> list[Via]:
         """The via points that have not passed."""
+        return [each for each in self.problem.via if self._left([each.time])]
+
+    @property
+    def _asked(self) -> Sequence[Condition[Any, Any]]:
+        return self.problem.conditions
+
+    def _left(self, times: Sequence[float]) -> list[float]:
+        """Those of some times that have not passed."""
         late = self.elapsed + 1e-9 * self.problem.grid.duration
-        return [each for each in self.problem.via if each.time > late]
+        return [time for time in times if time > late]
 
     @property
     def _ratio(self) -> float:
@@ -163,6 +189,11 @@ def _require_shiftable(problem: TrajectoryProblem) -> None:
     if clearance is not None and any(each.motion is not None for each in clearance.obstacles):
         raise InputError(
             "obstacles move in a time that begins anew with every motion: replan it as a whole."
+        )
+    if asked := [each.name for each in problem.conditions if each.timed]:
+        raise InputError(
+            f"condition {asked[0]!r} depends on time, which begins anew with every motion: replan "
+            "it as a whole."
         )
     if problem.ld.lagrangian.timed:
         raise InputError(

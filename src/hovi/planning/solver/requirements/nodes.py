@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from hovi.discrete.trajectory import Trajectory
-from hovi.planning.conditions.condition import describe
+from hovi.planning.conditions.condition import describe, whose
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.multipliers import largest_residual, node_residuals
 from hovi.planning.solver.requirements.requirement import MET, Requirement
@@ -21,4 +21,5 @@ class Nodes(Requirement):
         worst, size = largest_residual(self.problem, node_residuals(self.problem, motion.path))
         if size <= MET:
             return ""
-        return f"the goal at t = {worst.where.time:.4g} s is missed: {describe(worst, motion.path)}"
+        missed = describe(worst, motion.path)
+        return f"{whose(worst)} at t = {worst.where.time:.4g} s is missed: {missed}"

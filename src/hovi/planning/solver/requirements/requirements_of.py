@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.solver.requirements.asked import Asked
 from hovi.planning.solver.requirements.distances import Apart
 from hovi.planning.solver.requirements.ends import Ends
 from hovi.planning.solver.requirements.limits import WithinLimits
@@ -27,5 +28,7 @@ def requirements_between_ends(problem: TrajectoryProblem) -> Iterator[Requiremen
         yield Nodes(problem)
     if problem.limits is not None and problem.has_limits:
         yield WithinLimits(problem.limits, problem.coordinates)
+    if problem.bounds:
+        yield Asked(problem.bounds)
     if problem.clearance is not None:
         yield Apart(problem, problem.clearance)

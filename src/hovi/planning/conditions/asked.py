@@ -1,0 +1,57 @@
+"""The conditions that a problem is given: checked, at nodes, and at all times."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from hovi.discrete.grid import Grid
+from hovi.errors import InputError
+from hovi.planning.conditions.condition import Bounded, Condition, Equation, bound
+from hovi.planning.conditions.places import AtNode, AtTimes
+from hovi.planning.conditions.sets import Between
+from hovi.robot.space.coordinates import Coordinates
+
+Given = Sequence[Condition[Any, Any]]
+
+
+def as_conditions(given: Any) -> tuple[Condition[Any, Any], ...]:
+    """A condition, or several, as a tuple. Raises InputError for others, or two of one name."""
+    several = (given,) if isinstance(given, Condition) else given
+    if not isinstance(several, Sequence) or not all(isinstance(x, Condition) for x in several):
+        raise InputError(f"conditions must be a list of hovi.Condition, got {given!r:.200}.")
+    names = [each.name for each in several]
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError(f"two conditions have the name {name!r}; give each its own `name`.")
+    return tuple(several)
+
+
+def checked(given: Any, coordinates: Coordinates) -> tuple[Condition[Any, Any], ...]:
+    """The conditions with functions of a robot's coordinates. Raises InputError as `bound`."""
+    return tuple(bound(each, coordinates) for each in as_conditions(given))
+
+
+def asked_at_nodes(given: Given, grid: Grid) -> tuple[Equation, ...]:
+    """The equations at the nodes of a grid. Raises InputError where the grid has no such node."""
+    found = []
+    for each in given:
+        for time in times_of([each]):
+            node = grid.node_at(time)
+            place = AtNode(node, float(grid.t[node]))
+            found.append(dataclasses.replace(each, where=place))
+    return tuple(found)
+
+
+def times_of(given: Given) -> list[float]:
+    """The times at which grids need nodes, in [s]."""
+    places = (each.where for each in given if isinstance(each.where, AtTimes))
+    return [float(time) for place in places for time in np.asarray(place.times)]
+
+
+def bounded_of(given: Given) -> tuple[Bounded, ...]:
+    """Those that hold at all times."""
+    return tuple(each for each in given if isinstance(each.on, Between))

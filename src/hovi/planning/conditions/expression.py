@@ -1,0 +1,186 @@
+"""Functions from formulas and from CasADi expressions of q, v, a, tau and t."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from functools import cached_property
+from itertools import combinations_with_replacement
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import numpy.typing as npt
+
+from hovi.dynamics.point_function import PointFunction
+from hovi.effects.expressions.formula import expression
+from hovi.effects.expressions.formula_symbols import cost_symbols
+from hovi.effects.expressions.symbols import SceneSymbols
+from hovi.errors import InputError, nearest
+from hovi.planning.conditions.function import ARGUMENTS, Curvature, Function, Points, Slopes
+from hovi.robot.robot import Robot
+from hovi.robot.space import tangent
+from hovi.robot.space.configuration_space import ConfigurationSpace
+from hovi.robot.space.coordinates import Coordinates
+
+Array = npt.NDArray[np.float64]
+Given = str | Callable[..., Any] | Function
+"""A formula, a function of CasADi symbols whose arguments are some of ARGUMENTS, or a Function."""
+_JERK = "jerk", "j", "dtau", "torque_rate", "tau_rate"
+
+
+class Expression(Function):
+    """y from a CasADi expression.
+
+    symbols: of q, v, a, tau and t. y: a column of them. space: of the configurations; None if it is
+    a vector space.
+    """
+
+    def __init__(
+        self, symbols: dict[str, ca.SX], y: ca.SX, space: ConfigurationSpace | None
+    ) -> None:
+        self._symbols, self._y, self._space = symbols, y, space
+        self._n, self._size = int(symbols["v"].numel()), int(y.numel())
+        self._named = [x for x in ARGUMENTS if ca.depends_on(y, symbols[x])]
+        self._names = [x for x in self._named if x != "t"]
+
+    @property
+    def needs(self) -> frozenset[str]:
+        """What the expression names."""
+        return frozenset(self._named)
+
+    @property
+    def size(self) -> int:
+        """Number of rows of y."""
+        return self._size
+
+    def values(self, at: Points) -> Array:
+        """y, shape (P, size)."""
+        return self._values(*self._arguments(at))[0].reshape(len(at.q), self.size)
+
+    def slopes(self, at: Points) -> Slopes:
+        """First derivatives in what y names."""
+        found = self._slopes(*self._arguments(at))
+        shape = len(at.q), self.size, self._n
+        return {x: J.reshape(shape) for x, J in zip(self._names, found, strict=True)}
+
+    def curvature(self, at: Points, weights: Array) -> Curvature:
+        """Weighted second derivatives in what y names."""
+        if not self._pairs:
+            return {}
+        found = self._curvature(*self._arguments(at), weights)
+        shape = len(at.q), self._n, self._n
+        return {pair: H.reshape(shape) for pair, H in zip(self._pairs, found, strict=True)}
+
+    def __getstate__(self) -> dict[str, Any]:
+        """The functions without the expression, which cannot be pickled."""
+        functions = {name: getattr(self, name) for name in ("_values", "_slopes", "_curvature")}
+        kept = ("_named", "_names", "_n", "_size", "_pairs")
+        return functions | {name: getattr(self, name) for name in kept}
+
+    def _arguments(self, at: Points) -> list[Array]:
+        return [at.argument(x) for x in self._named]
+
+    def _block(self, name: str) -> slice:
+        """The columns of an argument among those of (q, v, a, tau)."""
+        first = ARGUMENTS.index(name) * self._n
+        return slice(first, first + self._n)
+
+    def _function(self, name: str, results: list[ca.SX], *more: ca.SX) -> PointFunction:
+        return PointFunction(
+            ca.Function(name, [*(self._symbols[x] for x in self._named), *more], results)
+        )
+
+    @cached_property
+    def _columns(self) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
+        q, v, a, tau = (self._symbols[x] for x in ARGUMENTS[:4])
+        return q, ca.vertcat(v, a, tau), ca.SX(0, 1), ca.SX(0, 1)
+
+    @cached_property
+    def _values(self) -> PointFunction:
+        return self._function("y", [self._y])
+
+    @cached_property
+    def _slopes(self) -> PointFunction:
+        J = tangent.jacobian(self._y, self._columns, self._space)
+        return self._function("dy", [J[:, self._block(x)] for x in self._names])
+
+    @cached_property
+    def _bent(self) -> tuple[ca.SX, dict[tuple[str, str], ca.SX]]:
+        """The weights, and the blocks of the second derivatives that are not zero."""
+        weights = ca.SX.sym("w", self.size)
+        H = tangent.hessian(ca.dot(weights, self._y), self._columns, self._space)[0]
+        pairs = combinations_with_replacement(self._names, 2)
+        blocks = {(x, z): H[self._block(x), self._block(z)] for x, z in pairs}
+        return weights, {pair: block for pair, block in blocks.items() if block.nnz() > 0}
+
+    @cached_property
+    def _pairs(self) -> list[tuple[str, str]]:
+        return list(self._bent[1])
+
+    @cached_property
+    def _curvature(self) -> PointFunction:
+        weights, blocks = self._bent
+        return self._function("ddy", list(blocks.values()), weights)
+
+
+def function_of(given: Given, name: str, coordinates: Coordinates) -> Function:
+    """A function of a robot's motion, or of other coordinates.
+
+    name: of the condition, in messages. Raises InputError or SceneError for formulas and functions
+    that are none of q, v, a, tau and t, that do not depend on the motion, or without values.
+    """
+    if isinstance(given, Function):
+        return given
+    n = coordinates.nv
+    nq = coordinates.nq
+    sizes = {"q": nq, "v": n, "a": n, "tau": n, "t": 1}
+    symbols = {x: ca.SX.sym(x, size) for x, size in sizes.items()}
+    what = f"condition {name!r}"
+    if isinstance(given, str):
+        if not isinstance(coordinates, Robot):
+            raise InputError(f"{what}: formulas need a robot: give a function of q, v and a.")
+        q, v, a, tau, t = symbols.values()
+        known = cost_symbols(coordinates, SceneSymbols(q, v, a, t), tau)
+        y = expression(what, given, known, columns=True)
+    else:
+        y = _called(given, what, symbols)
+    found = Expression(symbols, ca.densify(y), coordinates.curved_space)
+    if not found.needs - {"t"}:
+        raise InputError(
+            f"{what}: its function depends on none of q, v, a and tau, so that no motion changes "
+            "it: leave the condition out, or name one of them."
+        )
+    return found
+
+
+def _called(given: Callable[..., Any], what: str, symbols: dict[str, ca.SX]) -> ca.SX:
+    """The value of a function of some of the symbols, by the names of its arguments."""
+    try:
+        names = list(inspect.signature(given).parameters)
+    except (TypeError, ValueError):
+        names = []
+    for each in names:
+        if each in _JERK:
+            raise InputError(
+                f"{what}: its function takes {each!r}, and conditions on the jerk and on the "
+                "torque rate are not supported: use `limits`, or q, v, a, tau and t."
+            )
+        if each not in ARGUMENTS:
+            raise InputError(
+                f"{what}: its function takes {each!r}, which is none of q, v, a, tau and t: "
+                f"{nearest(each, ARGUMENTS)}"
+            )
+    y = given(*(symbols[each] for each in names))
+    try:
+        y = ca.SX(y) if not isinstance(y, list | tuple) else ca.vertcat(*map(ca.SX, y))
+    except (NotImplementedError, TypeError, ValueError):
+        raise InputError(
+            f"{what}: its function must return a CasADi expression or a list of them, got "
+            f"{type(y).__name__}."
+        ) from None
+    if min(y.shape) != 1:
+        raise InputError(
+            f"{what}: its function must return a column of one or more values, got shape {y.shape}."
+        )
+    return ca.vec(y)

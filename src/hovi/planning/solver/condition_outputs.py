@@ -1,0 +1,121 @@
+"""Conditions at all times as outputs y(q, v, a, tau, t) at the quadrature points.
+
+With x = (q, v, a), J = d tau / dx and y = y(x, tau, t) the chain rule gives dy = y_x + y_tau J, and
+for weights w of the outputs the second derivatives w y_xx + S + S^T + J^T (w y_tautau) J with
+S = (w y_xtau) J, beside those of tau with the weights w y_tau, which are the torque model's.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi.planning.conditions.condition import scales
+from hovi.planning.conditions.function import Curvature, Points, Slopes
+from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.solver.point_outputs import ExpandedOutputs, PointOutputs, Range
+
+Array = npt.NDArray[np.float64]
+
+JET = "q", "v", "a"
+
+
+class ConditionOutputs(PointOutputs):
+    """The values of conditions over their scales, between their bounds.
+
+    problem: on the grid whose points they are evaluated at.
+    """
+
+    def __init__(self, problem: TrajectoryProblem) -> None:
+        self.problem, self.given = problem, problem.bounds
+        self._scales = [scales(each) for each in self.given]
+
+    @property
+    def size(self) -> int:
+        """K, the number of values."""
+        return sum(each.y.size for each in self.given)
+
+    @property
+    def needs_torques(self) -> bool:
+        """Whether one of them depends on torques."""
+        return any("tau" in each.y.needs for each in self.given)
+
+    def bounds(self, t: Array) -> Range:
+        """Bounds of the outputs at times, (P, K) each."""
+        sides = [
+            [side / scale for side in each.on.at(t, each.y.size)]
+            for each, scale in zip(self.given, self._scales, strict=True)
+        ]
+        lower, upper = (np.concatenate(side, axis=1) for side in zip(*sides, strict=True))
+        return lower, upper
+
+    def values(self, at: Points) -> Array:
+        """y over its scale, (P, K)."""
+        found = zip(self.given, self._scales, strict=True)
+        return np.concatenate([each.y.values(at) / scale for each, scale in found], axis=1)
+
+    def expand(self, at: Points, force: Array) -> ExpandedOutputs:
+        """Derivatives in (q, v, a): see the module."""
+        n = at.v.shape[1]
+        J = self._torque_slopes(at) if self.needs_torques else None
+        slopes, first = [], 0
+        curvature, torques = np.zeros((len(at.q), 3 * n, 3 * n)), np.zeros((len(at.q), n))
+        for each, scale in zip(self.given, self._scales, strict=True):
+            own = force[:, first : first + each.y.size] / scale
+            first += each.y.size
+            dy = each.y.slopes(at)
+            slopes.append(_total(dy, J, each.y.size, at) / scale[:, None])
+            _add_curvature(curvature, each.y.curvature(at, own), J)
+            if "tau" in dy:
+                torques += np.matmul(own[:, None], dy["tau"])[:, 0]
+        return ExpandedOutputs(np.concatenate(slopes, axis=1), curvature, torques)
+
+    def _torque_slopes(self, at: Points) -> Array:
+        """J at the points, (P, nv, 3 nv)."""
+        ld, first, parts = self.problem.ld, 0, []
+        n = at.v.shape[1]
+        assert at.a is not None
+        for lagrangian, t in zip(ld.lagrangians, ld.point_times, strict=True):
+            here = slice(first, first + len(t))
+            jet = at.q[here], at.v[here], at.a[here]
+            parts.append(lagrangian.torque_slopes(*jet, t=t))
+            first += len(t)
+        return np.concatenate(parts)[:, :n]
+
+
+def _total(dy: Slopes, J: Array | None, size: int, at: Points) -> Array:
+    """dy / d(q, v, a) with what comes through the torques, (P, size, 3 nv)."""
+    n = at.v.shape[1]
+    total = np.zeros((len(at.q), size, 3 * n))
+    for x, slope in dy.items():
+        if x in JET:
+            total[:, :, _columns(x, n)] += slope
+        else:
+            assert J is not None
+            total += np.matmul(slope, J)
+    return total
+
+
+def _add_curvature(total: Array, parts: Curvature, J: Array | None) -> None:
+    """Add weighted second derivatives in (q, v, a), torques included, in place."""
+    n = total.shape[1] // 3
+    for (x, z), block in parts.items():
+        if "tau" not in (x, z):
+            total[:, _columns(x, n), _columns(z, n)] += block
+            if x != z:
+                total[:, _columns(z, n), _columns(x, n)] += block.transpose(0, 2, 1)
+            continue
+        assert J is not None
+        if x == z:
+            total += np.matmul(J.transpose(0, 2, 1), np.matmul(block, J))
+            continue
+        rows = block if z == "tau" else block.transpose(0, 2, 1)
+        S = np.matmul(rows, J)
+        here = _columns(x if z == "tau" else z, n)
+        total[:, here] += S
+        total[:, :, here] += S.transpose(0, 2, 1)
+
+
+def _columns(name: str, n: int) -> slice:
+    first = JET.index(name) * n
+    return slice(first, first + n)
