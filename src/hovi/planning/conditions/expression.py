@@ -13,9 +13,6 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.dynamics.point_function import PointFunction
-from hovi.effects.expressions.formula import expression
-from hovi.effects.expressions.formula_symbols import cost_symbols
-from hovi.effects.expressions.symbols import SceneSymbols
 from hovi.errors import InputError, nearest
 from hovi.planning.conditions.function import ARGUMENTS, Curvature, Function, Points, Slopes
 from hovi.robot.robot import Robot
@@ -133,13 +130,16 @@ def function_of(given: Given, name: str, coordinates: Coordinates) -> Function:
     if isinstance(given, Function):
         return given
     n = coordinates.nv
-    nq = coordinates.nq
-    sizes = {"q": nq, "v": n, "a": n, "tau": n, "t": 1}
+    sizes = {"q": coordinates.nq, "v": n, "a": n, "tau": n, "t": 1}
     symbols = {x: ca.SX.sym(x, size) for x, size in sizes.items()}
     what = f"condition {name!r}"
     if isinstance(given, str):
         if not isinstance(coordinates, Robot):
             raise InputError(f"{what}: formulas need a robot: give a function of q, v and a.")
+        from hovi.effects.expressions.formula import expression  # 10 ms
+        from hovi.effects.expressions.formula_symbols import cost_symbols
+        from hovi.effects.expressions.symbols import SceneSymbols
+
         q, v, a, tau, t = symbols.values()
         known = cost_symbols(coordinates, SceneSymbols(q, v, a, t), tau)
         y = expression(what, given, known, columns=True)

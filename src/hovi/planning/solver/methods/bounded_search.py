@@ -384,7 +384,7 @@ class BoundedSearch:
     def _worst_condition(self, trajectory: Trajectory) -> tuple[float, str]:
         """The largest excess of a condition, as a share of its scale, and what it is."""
         found = [ConditionBounds(each).worst(trajectory) for each in self.problem.bounds]
-        return max(found, default=(0.0, ""))
+        return max(found, default=(-np.inf, ""))
 
     def too_close(self, path: DiscretePath) -> str:
         """Which pair comes closer than the margin where there are rows of distances; "" if none."""

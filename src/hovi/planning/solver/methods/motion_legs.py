@@ -56,8 +56,9 @@ def legs_of(problem: TrajectoryProblem) -> list[Leg]:
     """
     distances, of = problem.distances, problem.ld.lagrangian
     held = {each.node: each for each in problem.holds if each.fixed[1].all()}
-    timed = any(each.timed for each in (*_parts(of), *problem.bounds))
-    timed = timed or bool(times_of(problem.conditions))
+    asked = problem.conditions
+    timed = any(each.timed for each in _parts(of)) or any(each.timed for each in asked)
+    timed = timed or bool(times_of(asked))
     moving = distances is not None and bool(distances.paths)
     if not held or timed or moving or isinstance(problem.goal, Periodic):
         return []
