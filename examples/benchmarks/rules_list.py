@@ -458,13 +458,6 @@ _rule(
     "True",
 )
 _rule(
-    "no curvature of charts far away",
-    "Far from a minimum models leave out the multipliers' curvature of charts.",
-    "_Search.run",
-    "self.decrease <= EXACT_DECREASE",
-    "True",
-)
-_rule(
     "larger penalties",
     "The penalty grows where a larger one makes the Hessian definite without a shift.",
     "_Search._factor",

@@ -233,11 +233,8 @@ class EqualityObjective(ABC, Generic[X]):
         """Whether c = 0 holds at x to its tolerances."""
 
     @abstractmethod
-    def model(self, x: X, multipliers: Array, exact: bool = True) -> ConstrainedModel:
-        """The second-order model of f + y.c at x; unless it is exact, H may lack terms of y.
-
-        Far from a minimum y is rough, and its curvature may lead astray.
-        """
+    def model(self, x: X, multipliers: Array) -> ConstrainedModel:
+        """The second-order model of f + y.c at x."""
 
     @abstractmethod
     def retract(self, x: X, step: Array, model: ConstrainedModel) -> X:

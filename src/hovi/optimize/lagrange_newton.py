@@ -58,8 +58,6 @@ ROUNDING = 1e-13
 FIRST_ACCURACY, LEAST_ACCURACY = 1e-2, 1e-10
 """Accuracy of linearised equations: far from a minimum, and at most; between them the squared
 relative decrease of the last Newton step, so that the last steps converge quadratically."""
-EXACT_DECREASE = 1e-2
-"""Relative decrease of a step after which models are exact."""
 MAX_RESTORATIONS = 4
 """How often the residual is made smaller alone."""
 LAST_DECREASE = 1e-12
@@ -133,8 +131,7 @@ class _Search(Generic[X]):
         self.filter = _Filter()
         self.shift = 0.0
         self.restorations = 0
-        self.before = self.decrease = math.inf
-        self.exact = False
+        self.before = math.inf
 
     def run(self) -> None:
         """Steps until one of the reasons to end."""
@@ -143,8 +140,7 @@ class _Search(Generic[X]):
         while len(self.ended.steps) < self.criteria.max_iterations:
             raise_if_interrupted()
             raise_if_late()
-            self.exact = self.decrease <= EXACT_DECREASE
-            model = self.objective.model(self.ended.x, self.ended.z, self.exact)
+            model = self.objective.model(self.ended.x, self.ended.z)
             factor, shift = self._factor(model)
             if factor is not None and self._step(model, factor, shift):
                 return
@@ -182,9 +178,7 @@ class _Search(Generic[X]):
         new = ended.z + change
         decrease = 0.5 * curvature + abs(float(new @ c))
         relative = decrease / max(abs(ended.value), 1e-300)
-        self.decrease = relative
-        settled = self.exact and relative <= self.criteria.decrease
-        settled = settled and self.objective.feasible(ended.x)
+        settled = relative <= self.criteria.decrease and self.objective.feasible(ended.x)
         if settled and shift > 0.0:
             return self._at_saddle(model, factor, shift)
         trial = self._search_along(model, factor, step)

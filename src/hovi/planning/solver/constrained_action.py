@@ -78,8 +78,8 @@ class ConstrainedAction(EqualityObjective[DiscretePath]):
         """Whether passive torques and conditions at nodes are within their tolerances."""
         return within(self.action.residuals(x), TORQUE_TOLERANCE, NODE_TOLERANCE)
 
-    def model(self, x: DiscretePath, multipliers: Array, exact: bool = True) -> ConstrainedModel:
-        """See EqualityObjective.model; what may be left out is the curvature of charts."""
+    def model(self, x: DiscretePath, multipliers: Array) -> ConstrainedModel:
+        """See EqualityObjective.model."""
         ld, outputs = self.problem.ld, self.action.outputs(x)
         slopes = [L.output_slope(y) for L, y in zip(ld.lagrangians, outputs, strict=True)]
         rows: list[ConstraintRows] = []
@@ -87,8 +87,7 @@ class ConstrainedAction(EqualityObjective[DiscretePath]):
         if self.moments is not None:
             for slope, force in zip(slopes, torque, strict=True):
                 slope[:, self.moments.passive] += force
-        curved = exact and ld.chart is not None
-        terms = self.multipliers(multipliers).forces if curved else None
+        terms = None if ld.chart is None else self.multipliers(multipliers).forces
         expansion = _expand(ld, x, "nodal", slopes, terms, self.action.jets(x))
         if self.moments is not None:
             for i, batch in enumerate(ld.batches):
