@@ -73,12 +73,11 @@ def test_a_first_plan_loads_no_unused_package() -> None:
 PLAN_FROM_THE_COMMAND_LINE = """
 import sys
 from hovi.cli.application import main
-assert main(['plan', 'two_link_reach'{more}]) == 0
+assert main(['plan', '{scene}'{more}]) == 0
 print(*sys.modules)
 """
 OTHER_COMMANDS = {
     "hovi.cli.commands.study",
-    "hovi.planning.search.joint_duration",
     "hovi.planning.sequence.sequence_planner",
     "hovi.planning.task_file.obstacle_tables",
     "hovi.viewing.replay_session",
@@ -89,19 +88,31 @@ OTHER_MOTIONS = {
     "hovi.effects.payload",
     "hovi.planning.obstacles.grasped",
     "hovi.planning.obstacles.primitives",
-    "hovi.planning.solver.bounded_action",
-    "hovi.planning.solver.methods.augmented_lagrangian",
-    "hovi.planning.solver.methods.bounded_search",
-    "hovi.planning.solver.methods.interior_point",
-    "hovi.planning.solver.methods.lagrange_newton",
-    "hovi.planning.solver.near.push_out",
 }
-"""Modules for limits, obstacles, loads and other effects than the scene's gravity."""
+"""Modules for obstacles, loads and other effects than the scene's gravity."""
+
+
+def modules_of_plan(scene: str, more: str = "") -> set[str]:
+    """The modules that a plan from the command line loads."""
+    return set(python(PLAN_FROM_THE_COMMAND_LINE.replace("{scene}", scene).replace("{more}", more)))
+
+
+@pytest.mark.parametrize(
+    ("scene", "number"), [("ur5_reach_limited", 10), ("ur5_around_sphere", 15)]
+)
+def test_what_limits_and_obstacles_need_is_loaded_with_them(scene: str, number: int) -> None:
+    """At least so many modules more than a motion without them, which needs none of its own."""
+    plain, other = (
+        {name for name in modules_of_plan(each) if name.startswith("hovi.planning.")}
+        for each in ("two_link_reach", scene)
+    )
+    assert plain <= other
+    assert len(other - plain) >= number
 
 
 @pytest.mark.parametrize("more", ["", ", '--json'"], ids=["text", "json"])
 def test_a_plan_from_the_command_line_loads_only_its_own_modules(more: str) -> None:
-    loaded = set(python(PLAN_FROM_THE_COMMAND_LINE.replace("{more}", more)))
+    loaded = modules_of_plan("two_link_reach", more)
     assert {"hovi.cli.commands.plan", "hovi.effects.gravity"} <= loaded
     assert not {"scipy", "matplotlib", "meshcat", "tornado", "numpy.ma", "lxml"} & loaded
     assert not {"rich.table", "rich.console", "rich.progress"} & loaded

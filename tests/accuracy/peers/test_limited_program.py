@@ -1,7 +1,8 @@
-"""The transcription with limits: kernels, bounds, and the minima of hovi's interior point."""
+"""The transcription with limits: kernels, bounds, and the minima of hovi's solver."""
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 
 import numpy as np
@@ -19,15 +20,11 @@ from hovi.discrete.guess import cubic
 from hovi.discrete.state import State
 from hovi.dynamics.symbolic_dynamics import casadi_functions
 from hovi.errors import SchemeError
-from hovi.optimize.criteria import Criteria
-from hovi.optimize.interior_point import minimize_bounded
-from hovi.optimize.start import Start
-from hovi.planning.problem.limits import Limits, as_limits
+from hovi.planning.problem.limits import as_limits
 from hovi.planning.problem.problem import TrajectoryProblem
-from hovi.planning.solver.bounded_action import BoundedAction
-from hovi.planning.solver.solver import guess_path
 from hovi.scene.scene import Scene
 from hovi.schemes import galerkin
+from oracles.on_grid import solve_on_grid
 
 Array = npt.NDArray[np.float64]
 
@@ -149,24 +146,40 @@ def test_assembled_derivatives_are_those_of_the_cost_and_the_constraints(
         np.testing.assert_allclose(exact, bent, rtol=1e-6, atol=1e-5)
 
 
-def interior_point(problem: TrajectoryProblem, limits: Limits) -> float:
-    """The cost of hovi's minimum with limits at the quadrature points."""
-    path = guess_path(problem, "cubic")
-    found = minimize_bounded(BoundedAction(problem, limits), Start(path), Criteria(decrease=1e-9))
-    assert found.feasible
-    return float(found.outputs.value)
+SAMPLES = tuple(np.linspace(0.0, 1.0, 25).tolist())
+"""Between the points of an interval."""
 
 
-@pytest.mark.parametrize("points", [None, 6])
-def test_ipopt_finds_the_minimum_of_the_interior_point(
-    points: int | None, kernels: LimitedKernels, arm_scene: Scene
+def test_the_cost_is_that_of_torques_at_the_points(
+    kernels: LimitedKernels, arm_scene: Scene
 ) -> None:
+    """h sum w 1/2 |tau|^2 by pin.rnea, of the motion that Ipopt finds."""
+    problem = reach(arm_scene)
+    cost, w = ipopt(problem, kernels)
+    program, _ = discrete(problem)
+    q, v, a = np.array(program.program.points @ w).reshape(-1, 3, 2).swapaxes(0, 1)
+    model = arm_scene.model
+    data = model.createData()
+    tau = np.array([pin.rnea(model, data, *jet) for jet in zip(q, v, a, strict=True)])
+    weights = np.tile(problem.grid.schemes[0].weights, INTERVALS) * problem.grid.steps[0]
+    assert cost == pytest.approx(float(weights @ np.vecdot(tau, tau)) / 2, rel=1e-12)
+
+
+@pytest.mark.parametrize(("points", "near"), [(None, 4e-3), (6, 1e-4)])
+def test_ipopt_finds_the_minimum_of_the_solver(
+    points: int | None, near: float, kernels: LimitedKernels, arm_scene: Scene
+) -> None:
+    """Limits at the points alone cost less than limits at all times; at many samples, as much."""
     problem = reach(arm_scene, points)
     limits = problem.limits
     assert limits is not None
-    cost, _ = ipopt(problem, kernels)
-    assert cost > 1.01 * interior_point(problem, limits.without("v", "a", "tau"))
-    assert cost == pytest.approx(interior_point(problem, limits), rel=1e-6)
+    at_points, everywhere = (ipopt(problem, kernels, samples)[0] for samples in ((), SAMPLES))
+    found = solve_on_grid(problem)
+    assert found.success, found.message
+    assert at_points <= everywhere * (1 + 1e-8)
+    free = dataclasses.replace(problem, limits=limits.without("v", "a", "tau"))
+    assert everywhere > 1.01 * solve_on_grid(free).cost
+    assert everywhere * (1 - 1e-6) <= found.cost <= everywhere * (1 + near)
 
 
 def test_limits_hold_at_samples_of_no_weight(kernels: LimitedKernels, arm_scene: Scene) -> None:
