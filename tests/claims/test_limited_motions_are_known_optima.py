@@ -74,11 +74,11 @@ def cruising(most: float, T: float, distance: float = 1.0) -> float:
 
 
 def bounced(most: float, T: float) -> float:
-    """Bryson and Denham: from q = 0 back to it, at the speed 1 and -1, with q <= l, for l <= T/6.
+    """Bryson and Denham: from q = 0 back to it, at the speed 1 and -1, with q <= l.
 
-    Of T = 1 it is 4 / (9 l); time and speed scale it.
+    For l <= T/6 it is held at l, for longer or shorter; up to T/4 it is touched once.
     """
-    return 4 / (9 * most) if T == 1.0 else np.nan
+    return 4 / (9 * most) if most <= T / 6 else (2 + 6 * (1 - 4 * most / T) ** 2) / T
 
 
 def known(kind: str) -> Optimum:
@@ -195,15 +195,18 @@ def test_with_nodes_where_limits_begin_to_hold_the_optimum_is_exact(
     assert found.cost > exact * (1 - 1e-7)
 
 
+def bouncing(most: float, intervals: int) -> hovi.TrajectoryProblem:
+    L = hovi.spline(1)
+    ld = hovi.DiscreteLagrangian(L, hovi.Grid.uniform(1.0, intervals, galerkin(3)))
+    limits = as_limits(L.coordinates, {"base": "none", "q": [[-1.0, most]]})
+    return hovi.TrajectoryProblem(ld, State([0.0], [1.0]), State([0.0], [-1.0]), limits)
+
+
 @pytest.mark.parametrize("most", [0.05, 0.1, 0.15])
 @pytest.mark.parametrize("intervals", [10, 40])
 def test_a_position_is_touched_where_bryson_and_denham_say(most: float, intervals: int) -> None:
     """It is reached after 3 l, stays, and is left 3 l before the end; the grid knows of neither."""
-    L = hovi.spline(1)
-    ld = hovi.DiscreteLagrangian(L, hovi.Grid.uniform(1.0, intervals, galerkin(3)))
-    limits = as_limits(L.coordinates, {"base": "none", "q": [[-1.0, most]]})
-    ends = State([0.0], [1.0]), State([0.0], [-1.0])
-    found = hovi.solve(hovi.TrajectoryProblem(ld, *ends, limits))
+    found = hovi.solve(bouncing(most, intervals))
     assert found.usable, found.message
     assert found.cost == pytest.approx(bounced(most, 1.0), rel=3e-3 if intervals == 40 else 0.05)
     assert found.cost > bounced(most, 1.0) * (1 - 1e-6)
@@ -213,6 +216,28 @@ def test_a_position_is_touched_where_bryson_and_denham_say(most: float, interval
     rising = most * (1 - (1 - t / (3 * most)) ** 3)
     held = found.trajectory.sample(t).q[:, 0]
     np.testing.assert_allclose(held, rising, rtol=0, atol=most * (5e-3 if intervals == 40 else 0.1))
+
+
+@pytest.mark.parametrize("most", [0.1, 1 / 12, 0.2])
+def test_a_longer_rest_at_a_position_is_free_and_a_later_touch_is_not(most: float) -> None:
+    found, h = hovi.solve(bouncing(most, 40)), 1e-5
+    slope = (bounced(most, 1.0 + h) - bounced(most, 1.0 - h)) / (2 * h)
+    assert found.duration_derivative == pytest.approx(slope, abs=5e-3 * found.cost)
+
+
+@pytest.mark.parametrize(("most", "first"), [(1 / 12, 2), (0.2, 4)])
+def test_momenta_change_where_a_position_is_held_and_nowhere_else(most: float, first: int) -> None:
+    """p is minus the jerk before the first of 8 nodes that is held, plus the jerk after the last.
+
+    At these two nodes it jumps, and between them nothing moves.
+    """
+    motion = hovi.solve(bouncing(most, 8)).trajectory
+    p, (*_, jerk) = motion.momenta[:, 0, 0], motion.jet([0.05], 3)
+    expected = np.zeros(9)
+    expected[:first], expected[9 - first :] = -jerk[0, 0], jerk[0, 0]
+    rest = np.delete(np.arange(9), [first, 8 - first])
+    size = np.abs(expected).max()
+    np.testing.assert_allclose(p[rest], expected[rest], rtol=0, atol=2e-3 * size)
 
 
 def test_a_speed_that_has_hardly_any_room_is_kept() -> None:

@@ -148,6 +148,20 @@ def test_with_limits_a_saddle_is_left_for_a_minimum(two_link: Robot, T: float) -
     assert -T * fastest**2 / 2 < found.cost < 0.0
 
 
+@pytest.mark.parametrize("T", HORIZONS)
+def test_steps_of_a_quadratic_cost_decrease_it_as_predicted(two_link: Robot, T: float) -> None:
+    """Those along negative curvature as well."""
+    problem = oscillating(two_link, T, 8)
+    path = problem.guess("cubic")
+    path = dataclasses.replace(path, inner=path.inner + np.array([0.3, 0.2]))
+    found = solve(problem, path, max_iterations=12)
+    costs = [problem.ld.action(path), *(step.value for step in found.history)]
+    predicted = np.array([step.decrease for step in found.history])
+    large = predicted > 1e-9 * np.abs(costs[1:])
+    assert large.sum() >= 1
+    np.testing.assert_allclose(-np.diff(costs)[large], predicted[large], rtol=0.1)
+
+
 # Dense eigenvalues
 
 
