@@ -65,6 +65,23 @@ def test_the_least_cost_is_little_more_than_that_of_ipopt_at_the_points(
 
 
 @pytest.mark.parametrize(
+    ("name", "limits", "most_steps"),
+    [
+        ("two_link_reach", {"tau": [12.0, 4.0]}, 17),
+        ("two_link_reach", {"v": [3.0, 6.0], "tau": [14.0, 5.0]}, 27),
+        ("ur5_reach", UR5, 32),
+        ("panda_reach", PANDA, 58),
+    ],
+)
+def test_a_limited_reach_takes_few_steps(
+    models: Path, name: str, limits: dict[str, object], most_steps: int
+) -> None:
+    found = solve(reach(models, name, {"base": "none"} | limits))
+    assert found.success, found.message
+    assert found.nit <= most_steps
+
+
+@pytest.mark.parametrize(
     "name",
     [
         "ur5_reach_limited",
