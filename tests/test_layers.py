@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 import subprocess
 import sys
 from graphlib import CycleError, TopologicalSorter
@@ -19,6 +20,22 @@ INNER_FLOOR = {
     for inner in folders
 }
 EFFORT = {("scene", name) for name in ("cost_terms", "effort_lagrangian", "squared_effort")}
+SOLVER = re.compile(
+    r"^\s*(from|import) hovi\.(optimize|planning\.(solver|refinement|search))\b", re.M
+)
+WITH_ORACLES = {
+    "optimize/test_banded_model.py",
+    "optimize/test_batched_newton.py",
+    "optimize/test_bordered_model.py",
+    "optimize/test_constrained_model.py",
+    "optimize/test_merge_tree.py",
+    "oracles/on_grid.py",
+    "planning/refinement/test_hp_refinement.py",
+    "planning/solver/limits/test_limit_rows.py",
+    "samples/interval_problems.py",
+    "test_rules.py",
+}
+"""Tests of what solvers are made of, by dense matrices and sampled curves, and the one door."""
 PUBLIC = {("accuracy",), ("effects",), ("schemes",), ("symbolic",)}
 
 
@@ -83,3 +100,10 @@ def test_the_map_in_the_docs_is_up_to_date() -> None:
     draw = [sys.executable, str(TOP / "docs" / "package_graph.py")]
     drawn = subprocess.run(draw, capture_output=True, text=True, check=True).stdout
     assert drawn.strip() in (TOP / "docs" / "design.md").read_text()
+
+
+def test_claims_about_motions_are_stated_through_public_names() -> None:
+    """So that they hold whatever solves: `hovi.plan`, `solve`, `replan`, or oracles.on_grid."""
+    tests = TOP / "tests"
+    found = {path for path in tests.rglob("*.py") if SOLVER.search(path.read_text())}
+    assert {str(path.relative_to(tests)) for path in found} <= WITH_ORACLES
