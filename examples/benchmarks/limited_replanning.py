@@ -119,7 +119,7 @@ def cold_difference(solution: hovi.Solution) -> float:
     From the cubic guess, or from the motion itself if that leads elsewhere.
     """
     for guess in ("cubic", solution.trajectory.path):
-        cold = solve_on_grid(solution.problem, guess, near=False)
+        cold = solve_on_grid(solution.problem, guess)
         if cold.success and distance(cold.trajectory, solution.trajectory) < SAME:
             return abs(solution.cost / cold.cost - 1)
     return np.nan

@@ -719,8 +719,8 @@ _rule(
     "replan on the central path",
     "A motion within limits is replanned from its central path.",
     "_Again._solved",
-    "problem.limited and self.central is not None",
-    "False",
+    "self.central if problem.limited else None",
+    "None",
 )
 _rule(
     "replan to a far frame goal by guesses",
@@ -973,7 +973,7 @@ _rule(
     "torque rates at once near one",
     "They are imposed at once on a known motion that is near such a limit.",
     "with_torque_rates_last",
-    "_margin(problem, limits, path) < NEAR_A_RATE",
+    "_margin(problem, limits, start.x) < NEAR_A_RATE",
     "False",
 )
 _at("limits", "planning.solver.methods.limits_between_points")
@@ -1094,7 +1094,7 @@ _rule(
     "first for the given duration",
     "A distant guess first becomes a motion of its own duration.",
     "_at_the_points",
-    "not search.criteria.near",
+    "not search.start.near",
     "False",
 )
 _rule(
@@ -1154,7 +1154,7 @@ _rule(
     "guess first, then near",
     "Within limits a solve on another grid begins as from a guess, then as near a solution.",
     "_Search._solved",
-    "(True,) if problem.distances is not None else (None, True)",
+    "(True,) if problem.distances is not None else (guessed, True)",
     "(True,)",
 )
 _rule(

@@ -20,7 +20,6 @@ class Criteria:
     radius: first radius of the trust region, in the metric; with bounds: BoundedObjective.radii.
     escape_saddles: leave a saddle along negative curvature; False stops there.
     exact: stop only where rounding alone remains, after a Newton step of an exact model.
-    near: whether the first iterate is near a solution, so that a barrier begins small.
     plain: with bounds, take plain steps alone, each barrier parameter until its problem is solved:
         slower, and more robust.
     outside: how far outputs may be outside their bounds at the end of `follow_bounded`, relative to
@@ -38,7 +37,6 @@ class Criteria:
     radius: float = 10.0
     escape_saddles: bool = True
     exact: bool = False
-    near: bool = False
     barrier: float = 1e-10
     enough: float = 0.0
     stalled: float = 0.0

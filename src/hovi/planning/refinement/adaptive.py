@@ -12,6 +12,7 @@ import numpy as np
 
 from hovi.discrete.grid import DiscretePath, Grid
 from hovi.discrete.trajectory import Trajectory
+from hovi.optimize.start import Start
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.problem.tolerance import Accuracy, Round, Tolerance
 from hovi.planning.refinement.candidate import Candidate
@@ -27,7 +28,6 @@ from hovi.planning.refinement.next_grid import MAX_ERROR_OF_DECAY, interpolated_
 from hovi.planning.refinement.whirling import MAX_WORK
 from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.central_path import CentralPath
-from hovi.planning.solver.methods.method import Method
 from hovi.planning.solver.solver import Solution, solve_on_grid
 from hovi.planning.solver.status import Status
 from hovi.schemes import galerkin
@@ -252,11 +252,11 @@ class _Search:
         problem: TrajectoryProblem,
         guess: Trajectory | DiscretePath,
         last: Candidate,
-        along: Method | None,
+        along: CentralPath | None,
     ) -> Solution:
         """Solve with the remaining time, from the last candidate's motion or a finer one.
 
-        along: method that follows the central path of that motion; None for the default one.
+        along: central path of that motion on the grid of the problem; None for none.
         """
         steps = self.max_iterations
         if last.whirl is not None:
@@ -264,14 +264,13 @@ class _Search:
         taken, seconds = 0, 0.0
         # A motion would be moved out of its obstacles once more, were it not for `near`. Within
         # limits alone a solve from the guess takes fewer steps, where it ends well.
-        for near in (True,) if problem.distances is not None else (None, True):
+        guessed = isinstance(guess, Trajectory)
+        for near in (True,) if problem.distances is not None else (guessed, True):
             solution = solve_on_grid(
                 problem,
-                guess,
+                Start(guess, along, None if along is None else LEVEL, near),
                 max_iterations=steps,
                 time_limit=self.deadline.seconds_left,
-                method=along,
-                near=near,
                 barrier=self.tolerance.barrier,
             )
             taken, seconds = taken + solution.nit, seconds + solution.solve_seconds
@@ -329,8 +328,8 @@ class _Search:
 
 def _along(
     central: CentralPath | None, known: TrajectoryProblem, problem: TrajectoryProblem
-) -> Method | None:
-    """A method that follows a central path on another grid; None without a path or obstacles.
+) -> CentralPath | None:
+    """A central path on another grid; None without a path or obstacles.
 
     In a solution some pairs are at their least distance, so that steps from it are short; where the
     barrier was larger, there is room.
@@ -338,9 +337,7 @@ def _along(
     """
     if central is None or problem.distances is None:
         return None
-    from hovi.planning.solver.methods.interior_point import InteriorPoint  # 10 ms
-
-    return InteriorPoint(central.resampled(known, problem), LEVEL)
+    return central.resampled(known, problem)
 
 
 def _hides(candidate: Candidate) -> bool:

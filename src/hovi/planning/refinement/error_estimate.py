@@ -24,12 +24,12 @@ from hovi.discrete.guess import stretched
 from hovi.discrete.measures.motion_error import MotionError, deviation, sample_points, times_of
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError
+from hovi.optimize.start import Start
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.refinement.interpolated_outputs import interpolated_slopes
 from hovi.planning.refinement.nearby_minimum import nearby_minimum
 from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.central_path import CentralPath
-from hovi.planning.solver.methods.method import Method
 from hovi.planning.solver.outcome.cost_with_time import cost_of, price_of_time
 from hovi.planning.solver.receding.last_motion import meets
 from hovi.planning.solver.solver import Solution, solve_on_grid
@@ -173,17 +173,15 @@ def richer_within_limits(
     It starts from the solution's central path, and torques are not checked between the points.
     Finished, it is a solution within limits everywhere. time_limit: in [s].
     """
-    from hovi.planning.solver.methods.interior_point import InteriorPoint  # 10 ms
-
     problem, central = solution.problem, solution.central
     assert problem is not None
     assert central is not None
     fine, path = problem.finer, solution.trajectory.path
     paths = tuple(prolonged(point, fine.grid) for _, point in central.points)
-    method = InteriorPoint(central.on(fine.grid, paths), RICHER_LEVEL)
-    start = prolonged(path, fine.grid)
+    along = central.on(fine.grid, paths)
+    start = Start(prolonged(path, fine.grid), along, RICHER_LEVEL, near=True)
     barrier = max(RICHER_BARRIER, central.level)
-    found = _solved(fine, start, problem, path, time_limit, method, barrier)
+    found = _solved(fine, start, problem, path, time_limit, barrier)
     if found is None:
         return None
     return dataclasses.replace(found, finish=partial(_finished, found, central.level))
@@ -224,17 +222,13 @@ def _finished(found: FinerSolution, barrier: float) -> Solution | None:
     It is returned as it is if it was solved to the end and meets its limits between the points too.
     barrier: last barrier parameter, relative to the mean density of the cost.
     """
-    from hovi.planning.solver.methods.interior_point import InteriorPoint
-
     known = found.finish()
     if known is None or known.central is None or known.problem is None:
         return None
     if known.central.level <= SAME_LEVEL * barrier and meets(known.problem, known.trajectory.path):
         return dataclasses.replace(known, central=known.central.freed())
-    method = InteriorPoint(known.central.freed())
-    solution = solve_on_grid(
-        known.problem, known.trajectory.path, near=True, method=method, barrier=barrier
-    )
+    start = Start(known.trajectory.path, known.central.freed(), near=True)
+    solution = solve_on_grid(known.problem, start, barrier=barrier)
     return solution if solution.success else None
 
 
@@ -248,11 +242,11 @@ def finer_solution(
     if problem.limited:
         halves = problem.on(problem.grid.halved())
         curve = stretched(problem.trajectory(path), problem.grid.duration, problem.ld.k)
-        return _solved(halves, halves.path(curve), problem, path, time_limit)
+        return _solved(halves, Start(halves.path(curve), near=True), problem, path, time_limit)
     fine = problem.finer
     start = prolonged(path, fine.grid)
     if problem.constrained:
-        return _solved(fine, start, problem, path, time_limit)
+        return _solved(fine, Start(start, near=True), problem, path, time_limit)
     values = problem.ld.values(path)
     objective, known = ActionObjective(fine), float(np.sum(values))
     efforts = interpolated_slopes(problem.ld, path, fine.ld)
@@ -272,20 +266,17 @@ def finer_solution(
 
 def _solved(
     fine: TrajectoryProblem,
-    start: DiscretePath,
+    start: Start[DiscretePath, CentralPath],
     problem: TrajectoryProblem,
     path: DiscretePath,
     time_limit: float | None,
-    method: Method | None = None,
     barrier: float = RICHER_BARRIER,
 ) -> FinerSolution | None:
     """The finer solution by a full solve, which may split intervals for limits.
 
     Its gains are the cost of the difference of the torques: see `_cost_of_difference`.
     """
-    solution = solve_on_grid(
-        fine, start, time_limit=time_limit, near=True, method=method, barrier=barrier
-    )
+    solution = solve_on_grid(fine, start, time_limit=time_limit, barrier=barrier)
     if not solution.success or solution.problem is None:
         return None
     finer = solution.trajectory

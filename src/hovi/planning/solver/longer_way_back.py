@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import dataclasses
 
-from hovi.discrete.grid import DiscretePath
 from hovi.optimize.criteria import Criteria
 from hovi.planning.problem.problem import TrajectoryProblem
-from hovi.planning.solver.methods.method import Method, MethodResult, Report
+from hovi.planning.solver.methods.method import Guess, Method, MethodResult, Report
 from hovi.planning.solver.status import Status
 from hovi.system.deadline import Deadline
 
@@ -18,13 +17,13 @@ DOUBLINGS = 2
 def minimized(
     method: Method,
     problem: TrajectoryProblem,
-    path: DiscretePath,
+    start: Guess,
     criteria: Criteria,
     report: Report | None,
 ) -> MethodResult:
     """The result of a method, with a longer way back of the start if it finds no motion."""
     deadline = Deadline(criteria.time_limit)
-    found = method.minimize(problem, path, criteria, report)
+    found = method.minimize(problem, start, criteria, report)
     for _ in range(DOUBLINGS):
         limits = problem.limits
         if found.status is not Status.INFEASIBLE or limits is None or not limits.excused:
@@ -32,7 +31,7 @@ def minimized(
         longer = dataclasses.replace(limits, window=2.0 * limits.window)
         problem = dataclasses.replace(problem, limits=longer)
         left = dataclasses.replace(criteria, time_limit=deadline.seconds_left)
-        again = method.minimize(problem, path, left, report)
+        again = method.minimize(problem, start, left, report)
         history = [*found.history, *again.history]
         found = dataclasses.replace(again, nit=found.nit + again.nit, history=history)
     return found

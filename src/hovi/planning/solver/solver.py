@@ -22,6 +22,7 @@ from hovi.errors import InputError
 from hovi.optimize.criteria import Criteria
 from hovi.optimize.ended import Iteration, Reason
 from hovi.optimize.quadratic_model import QuadraticModel
+from hovi.optimize.start import Start
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.notation.ends import End
 from hovi.planning.problem.problem import TrajectoryProblem
@@ -30,7 +31,7 @@ from hovi.planning.problem.units import as_time_limit, seconds
 from hovi.planning.solver.initial_path import guess_path, turned_on
 from hovi.planning.solver.limits.row_forces import at_instants
 from hovi.planning.solver.longer_way_back import minimized
-from hovi.planning.solver.methods.choice import method_for, method_from
+from hovi.planning.solver.methods.choice import method_for
 from hovi.planning.solver.methods.method import Method, MethodResult, Report
 from hovi.planning.solver.methods.result_motion import motion_of
 from hovi.planning.solver.methods.stationary import Stationary
@@ -301,10 +302,9 @@ class _Again:
         if isinstance(goal, FrameGoal) and not is_near(goal, problem, path):
             path = problem.moved_to_guesses(path)
         options = {"time_limit": time_limit} | options
-        if problem.limited and self.central is not None:
-            options = {"method": method_from(self.central)} | options
         if problem.limited or not problem.plain:
-            return solve_on_grid(problem, path, near=True, **options)
+            central = self.central if problem.limited else None
+            return solve_on_grid(problem, Start(path, central, near=True), **options)
         found = solve_on_grid(problem, follow(path, problem, self.model), **options)
         return dataclasses.replace(found, nit=found.nit + 1)
 
@@ -325,20 +325,19 @@ class _Again:
 @interruptible
 def solve_on_grid(
     problem: TrajectoryProblem,
-    guess: str | Trajectory | DiscretePath = "cubic",
+    guess: str | Trajectory | DiscretePath | Start[Any, Any] = "cubic",
     *,
     max_iterations: int = 500,
     time_limit: float | None = None,
     escape_saddles: bool = True,
     report: Report | None = None,
     method: Method | None = None,
-    near: bool | None = None,
     barrier: float = LAST_BARRIER,
 ) -> Solution:
     """A motion that makes the discrete action stationary, without a check between the points.
 
-    near: whether the guess is the motion of a similar problem, near which a minimum within limits
-        is looked for; that is so for a Trajectory when None.
+    guess: as for `hovi.solve`; near a Trajectory, as the motion of a similar problem, a minimum
+        within limits is looked for. Or a Start from one of these, with what else is known.
     barrier: last barrier parameter within limits, relative to the mean density of the cost, which
         exceeds its minimum by some ten times as much.
     Other arguments, cost and errors as of `hovi.solve`, which checks the motion.
@@ -349,20 +348,22 @@ def solve_on_grid(
         raise InputError(
             f"method {type(method).__name__} does not support this problem; leave `method` out."
         )
-    path = guess_path(problem, guess)
+    begun = guess if isinstance(guess, Start) else Start(guess, near=isinstance(guess, Trajectory))
+    path = guess_path(problem, begun.x)
     criteria = Criteria(
         decrease=STATIONARY_DECREASE,
         max_iterations=max_iterations,
         time_limit=time_limit,
         escape_saddles=escape_saddles,
-        near=isinstance(guess, Trajectory) if near is None else near,
         barrier=barrier,
         enough=REMAINING_SHARE * barrier,
     )
     started = time.perf_counter()
     try:
         with Deadline(time_limit).in_force():
-            result = minimized(method, problem, path, criteria, report)
+            result = minimized(
+                method, problem, dataclasses.replace(begun, x=path), criteria, report
+            )
     except KeyboardInterrupt:  # outside the iterations, which return their current point
         record_interrupt()
         result = _the_guess(problem, path, Reason.INTERRUPTED)

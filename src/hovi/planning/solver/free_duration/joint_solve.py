@@ -19,7 +19,7 @@ from hovi.planning.solver.action_objective import MAX_BAND_INTERVALS
 from hovi.planning.solver.free_duration.timed_action import TimedAction
 from hovi.planning.solver.free_duration.timed_path import TimedPath, TimePrice, stretched_path
 from hovi.planning.solver.free_duration.timed_search import minimum_within_limits
-from hovi.planning.solver.methods.method import MethodResult
+from hovi.planning.solver.methods.method import Guess, MethodResult
 from hovi.planning.solver.outcome.cost_with_time import cost_of, price_of_time
 from hovi.planning.solver.solver import STATIONARY_DECREASE, Solution, solution_of
 from hovi.planning.solver.status import Status, chart_sentence, status_of
@@ -74,11 +74,10 @@ def solve_jointly(
         time_limit=time_limit,
         escape_saddles=escape_saddles,
         exact=True,
-        near=near,
         barrier=barrier,
     )
     if problem.limited and problem.limits is not None:
-        result = _limited(first, problem.limits, guess, price, criteria)
+        result = _limited(first, problem.limits, Start(guess, near=near), price, criteria)
     else:
         result = _unlimited(first, guess, price, criteria)
     return solution_of(result, 0.0, time.perf_counter() - began)
@@ -116,7 +115,7 @@ def _unlimited(
 def _limited(
     problem: TrajectoryProblem,
     limits: Limits,
-    guess: DiscretePath,
+    start: Guess,
     price: TimePrice,
     criteria: Criteria,
 ) -> MethodResult:
@@ -125,9 +124,9 @@ def _limited(
     reason = contradiction(longest, limits)
     if reason:
         message = f"no motion within the limits was found: {reason}."
-        value = cost_of(problem, guess)
-        return MethodResult(problem, guess, value, Status.INFEASIBLE, message)
-    return minimum_within_limits(problem, limits, guess, price, criteria)
+        value = cost_of(problem, start.x)
+        return MethodResult(problem, start.x, value, Status.INFEASIBLE, message)
+    return minimum_within_limits(problem, limits, start, price, criteria)
 
 
 def _negative_eigenvalues(objective: TimedAction, ended: Ended[TimedPath, None]) -> int:

@@ -22,7 +22,7 @@ from hovi.planning.solver.free_duration.timed_path import TimedPath, TimePrice, 
 from hovi.planning.solver.methods.bounded_search import Begun, Bounded, BoundedSearch
 from hovi.planning.solver.methods.feasibility import solved_from
 from hovi.planning.solver.methods.limits_between_points import tightened, usable
-from hovi.planning.solver.methods.method import MethodResult
+from hovi.planning.solver.methods.method import Guess, MethodResult
 from hovi.planning.solver.outcome.cost_with_time import cost_of
 from hovi.planning.solver.status import Status, unfinished
 from hovi.system.dataclass import dataclass
@@ -43,15 +43,12 @@ ROUGH_BARRIER = 1e-2
 def minimum_within_limits(
     problem: TrajectoryProblem,
     limits: Limits,
-    guess: DiscretePath,
+    start: Guess,
     price: TimePrice,
     criteria: Criteria,
 ) -> MethodResult:
-    """A motion and a duration of least S + w T within limits, from a guess for the problem's.
-
-    criteria.near: whether the guess nearly is a solution.
-    """
-    search = TimedSearch(problem, limits, criteria, None, guess, price=price)
+    """A motion and a duration of least S + w T within limits, from a guess for the problem's."""
+    search = TimedSearch(problem, limits, criteria, None, start, price=price)
     try:
         return _searched(search)
     except KeyboardInterrupt:  # between two solves, which handle their own
@@ -184,7 +181,7 @@ def _at_the_points(search: TimedSearch) -> Bounded:
     stretched or shrunk to a bound; a duration that is too short for one moves from the beginning.
     """
     path = search.guess
-    if not search.criteria.near:
+    if not search.start.near:
         fixed = search.solve_fixed(path)
         if fixed.why in STOPPED:
             return fixed

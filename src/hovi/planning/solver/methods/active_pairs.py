@@ -21,13 +21,13 @@ from hovi.planning.problem.contradictions import contradiction
 from hovi.planning.problem.limits import no_limits
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.methods.augmented_lagrangian import AugmentedLagrangian
-from hovi.planning.solver.methods.method import Method, MethodResult, Report
+from hovi.planning.solver.methods.method import Guess, Method, MethodResult, Report
 from hovi.planning.solver.methods.trust_region import TrustRegion
 from hovi.planning.solver.status import Status, unfinished
 from hovi.system.deadline import Deadline, OutOfTimeError
 from hovi.system.interruption import record_interrupt
 
-Solve = Callable[[TrajectoryProblem, DiscretePath, Criteria], MethodResult]
+Solve = Callable[[TrajectoryProblem, Guess, Criteria], MethodResult]
 Index = npt.NDArray[np.intp]
 
 FIRST_BEYOND = 0.002
@@ -42,7 +42,7 @@ WITHOUT_LIMITS: tuple[Method, ...] = (TrustRegion(), AugmentedLagrangian())
 def with_active_pairs(
     solve: Solve,
     problem: TrajectoryProblem,
-    path: DiscretePath,
+    start: Guess,
     criteria: Criteria,
     report: Report | None = None,
 ) -> MethodResult:
@@ -53,14 +53,14 @@ def with_active_pairs(
     """
     limits = problem.limits or no_limits(problem.coordinates)
     if problem.distances is None or contradiction(problem, limits):
-        return solve(problem, path, criteria)
-    return _Rounds(solve, problem, criteria, report).run(path)
+        return solve(problem, start, criteria)
+    return _Rounds(solve, problem, start, criteria, report).run()
 
 
 def without_pairs(
     solve: Solve,
     problem: TrajectoryProblem,
-    path: DiscretePath,
+    start: Guess,
     criteria: Criteria,
     report: Report | None = None,
 ) -> MethodResult | None:
@@ -70,27 +70,33 @@ def without_pairs(
     """
     if problem.distances is None or contradiction(problem, no_limits(problem.coordinates)):
         return None
-    return _Rounds(solve, problem, criteria, report).free(path)
+    return _Rounds(solve, problem, start, criteria, report).free()
 
 
 class _Rounds:
     """The solves so far. nit, history: of all of them."""
 
     def __init__(
-        self, solve: Solve, problem: TrajectoryProblem, criteria: Criteria, report: Report | None
+        self,
+        solve: Solve,
+        problem: TrajectoryProblem,
+        start: Guess,
+        criteria: Criteria,
+        report: Report | None,
     ) -> None:
-        self._solve, self._problem, self._report = solve, problem, report
+        self._solve, self._problem, self._start, self._report = solve, problem, start, report
         self._criteria, self._deadline = criteria, Deadline(criteria.time_limit)
 
-    def run(self, path: DiscretePath) -> MethodResult:
+    def run(self) -> MethodResult:
         """Solve and add pairs until none is too close."""
+        path = self._start.x
         try:
             chosen = self._too_close(self._problem, path, FIRST_BEYOND)
         except KeyboardInterrupt:
             record_interrupt()  # which the solve sees
-            return self._solve(self._problem, path, self._criteria_left())
+            return self._solve(self._problem, self._start, self._criteria_left())
         except OutOfTimeError:
-            return self._solve(self._problem, path, self._criteria_left())
+            return self._solve(self._problem, self._start, self._criteria_left())
         result = self._solved(self._problem, path, chosen)
         while result.status in (Status.MINIMUM, Status.SADDLE):
             try:
@@ -107,9 +113,10 @@ class _Rounds:
             result = self._again(result, chosen, path if free else None)
         return result
 
-    def free(self, path: DiscretePath) -> MethodResult | None:
+    def free(self) -> MethodResult | None:
         """A solve without any pair; None where one is too close, before or after it."""
         try:
+            path = self._start.x
             if len(self._too_close(self._problem, path, FIRST_BEYOND)) > 0:
                 return None
             result = self._solved(self._problem, path, np.zeros(0, dtype=np.intp))
@@ -158,12 +165,12 @@ class _Rounds:
         whole = problem.clearance
         assert whole is not None
         part = with_clearance(problem, PartOfClearance.of(whole, chosen.tolist()))
-        criteria = self._criteria_left()
+        criteria, start = self._criteria_left(), dataclasses.replace(self._start, x=path)
         if part.limited:
-            result = self._solve(part, path, criteria)
+            result = self._solve(part, start, criteria)
         else:
             method = next(method for method in WITHOUT_LIMITS if method.supports(part))
-            result = method.minimize(part, path, criteria, self._report)
+            result = method.minimize(part, start, criteria, self._report)
         return dataclasses.replace(result, problem=with_clearance(result.problem, whole))
 
 

@@ -22,7 +22,7 @@ from hovi.planning.solver.augmented_lagrangian_rounds import (
     unmet_sentence,
     within,
 )
-from hovi.planning.solver.methods.method import Method, MethodResult, Report
+from hovi.planning.solver.methods.method import Guess, Method, MethodResult, Report
 from hovi.planning.solver.methods.trust_region import negative_eigenvalues
 from hovi.planning.solver.multipliers import Multipliers
 from hovi.planning.solver.outcome.cost_with_time import cost_of
@@ -45,15 +45,15 @@ class AugmentedLagrangian(Method):
     def minimize(
         self,
         problem: TrajectoryProblem,
-        path: DiscretePath,
+        start: Guess,
         criteria: Criteria,
         report: Report | None = None,
     ) -> MethodResult:
         """See Method.minimize."""
         if problem.unreachable:
-            value, message = cost_of(problem, path), f"{problem.unreachable}."
-            return MethodResult(problem, path, value, Status.INFEASIBLE, message)
-        ended, known, reason, history = _rounds(problem, path, criteria, report)
+            value, message = cost_of(problem, start.x), f"{problem.unreachable}."
+            return MethodResult(problem, start.x, value, Status.INFEASIBLE, message)
+        ended, known, reason, history = _rounds(problem, start.x, criteria, report)
         objective = ActionObjective(problem, multipliers=known)
         n_neg = negative_eigenvalues(objective, ended)
         nit, cost = len(history), cost_of(problem, ended.x)

@@ -45,7 +45,7 @@ from hovi.planning.solver.condition_outputs import ConditionOutputs
 from hovi.planning.solver.limits.graded_parts import GivenEnds
 from hovi.planning.solver.limits.limit_rows import LimitRows
 from hovi.planning.solver.limits.row_forces import forces_of, joined
-from hovi.planning.solver.methods.method import Report
+from hovi.planning.solver.methods.method import Guess, Report
 from hovi.planning.solver.multipliers import Multipliers
 from hovi.planning.solver.near.clearance_rows import ClearanceRows
 from hovi.planning.solver.near.cleared_action import ClearedAction
@@ -77,7 +77,7 @@ class BoundedSearch:
     """The current problem of a search, and the resources used so far.
 
     problem: on the current grid; its intervals are halved where limits do not hold.
-    guess: the initial guess, on the problem's grid.
+    start: the initial guess; guess: the same on the problem's grid.
     iterations: steps of all solves.
     margins: share of its range by which each bound is tightened in each interval, shape
         (2, N, kinds nv + pairs + values of conditions). clearance: bounded distances, or None.
@@ -87,7 +87,8 @@ class BoundedSearch:
     last: the problem and the motion of the last solve. solved: how it ended, and its objective.
     points: of the central path, with a larger barrier than that of the last solution. at_level:
         whether a solve begins on one. timed: whether the duration is free.
-    along, level: see InteriorPoint.
+    along, level: central path of a similar problem, if there is one on as many intervals, and the
+        barrier parameter at which it is begun: see Start.
     locally_infeasible: see MethodResult.
     """
 
@@ -96,18 +97,17 @@ class BoundedSearch:
     limits: Limits
     criteria: Criteria
     report: Report | None
-    guess: DiscretePath
+    start: Guess
     iterations: int = 0
     multipliers: Multipliers | None = None
     unmet: str = ""
-    along: CentralPath | None = None
-    level: float | None = None
     lazy: bool = False
     at_level: bool = False
     locally_infeasible: bool = False
 
     def __post_init__(self) -> None:
         self.deadline = Deadline(self.criteria.time_limit)
+        self.guess, self.along, self.level = self.start.x, self.start.z, self.start.mu
         self.last = self.problem, self.guess
         self.history: list[Iteration] = []
         distances = self.problem.distances

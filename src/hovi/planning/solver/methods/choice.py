@@ -3,14 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.methods.method import Method
 from hovi.planning.solver.methods.trust_region import TrustRegion
-
-if TYPE_CHECKING:
-    from hovi.planning.solver.central_path import CentralPath
 
 
 def all_methods() -> Iterator[Method]:
@@ -33,10 +29,3 @@ def all_methods() -> Iterator[Method]:
 def method_for(problem: TrajectoryProblem) -> Method:
     """The first method that supports a problem."""
     return next(method for method in all_methods() if method.supports(problem))
-
-
-def method_from(central: CentralPath) -> Method:
-    """The method that begins on the central path of another motion."""
-    from hovi.planning.solver.methods.interior_point import InteriorPoint
-
-    return InteriorPoint(central)

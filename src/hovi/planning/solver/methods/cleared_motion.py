@@ -19,6 +19,7 @@ from hovi.planning.solver.augmented_lagrangian_rounds import (
 from hovi.planning.solver.central_path import CentralPath
 from hovi.planning.solver.limits.limit_rows import LimitRows
 from hovi.planning.solver.methods.bounded_search import Bounded, BoundedSearch
+from hovi.planning.solver.methods.method import Guess
 from hovi.planning.solver.methods.motion_legs import Leg, joined, legs_of
 from hovi.planning.solver.multipliers import Multipliers
 from hovi.planning.solver.near.clearance_rows import ClearanceRows
@@ -110,8 +111,9 @@ def _by_legs(search: BoundedSearch, guess: DiscretePath) -> Bounded | None:
 def _search_of(leg: Leg, search: BoundedSearch, guess: DiscretePath) -> BoundedSearch:
     """The search of a leg. guess: of the whole motion."""
     problem, criteria = leg.problem, search.remaining_criteria()
+    start: Guess = Start(leg.path(guess))
     limits = problem.limits or no_limits(problem.coordinates)
-    return BoundedSearch(problem, limits, criteria, search.report, leg.path(guess), lazy=True)
+    return BoundedSearch(problem, limits, criteria, search.report, start, lazy=True)
 
 
 def _from_legs(

@@ -79,7 +79,7 @@ def feasible_motion(search: BoundedSearch) -> tuple[Bounded, str]:
 def _solved_nearby(search: BoundedSearch, path: DiscretePath) -> Bounded | None:
     """The solution near a guess that is taken to be near one; None if it is not, or that fails."""
     constrained = search.problem.constrained and search.near is None
-    if not search.criteria.near or search.clearance is not None or constrained:
+    if not search.start.near or search.clearance is not None or constrained:
         return None
     whole = search.criteria
     most, along = whole.max_iterations, search.along
@@ -157,9 +157,8 @@ def follow(problem: TrajectoryProblem, along: CentralPath, barrier: float) -> Ce
     barrier: last barrier parameter, relative to the mean density of the cost.
     """
     limits = problem.limits or no_limits(problem.coordinates)
-    search = BoundedSearch(
-        problem, limits, Criteria(barrier=barrier), None, along.last, along=along
-    )
+    start = Start(along.last, along)
+    search = BoundedSearch(problem, limits, Criteria(barrier=barrier), None, start)
     _adopt(search, along)
     ended = _followed(search, along, COMPARED)
     if ended is None or ended.why is not Reason.STATIONARY:

@@ -14,12 +14,11 @@ from hovi.optimize.ended import STOPPED, Reason
 from hovi.planning.problem.contradictions import contradiction
 from hovi.planning.problem.limits import no_limits
 from hovi.planning.problem.problem import TrajectoryProblem
-from hovi.planning.solver.central_path import CentralPath
 from hovi.planning.solver.methods.active_pairs import with_active_pairs, without_pairs
 from hovi.planning.solver.methods.bounded_search import BoundedSearch
 from hovi.planning.solver.methods.feasibility import feasible_motion
 from hovi.planning.solver.methods.limits_between_points import tightened, usable
-from hovi.planning.solver.methods.method import Method, MethodResult, Report
+from hovi.planning.solver.methods.method import Guess, Method, MethodResult, Report
 from hovi.planning.solver.methods.torque_rates_last import with_torque_rates_last
 from hovi.planning.solver.non_finite import non_finite_sentence
 from hovi.planning.solver.outcome.cost_with_time import cost_of
@@ -52,21 +51,11 @@ class InteriorPoint(Method):
     First a motion within bounds at the quadrature points is found; then bounds are tightened and
     intervals halved until the limits hold everywhere to their tolerance.
 
-    along: the central path of a similar problem on the same intervals, where it starts; None to
-        start from the guess. level: the barrier parameter at which it starts, relative to the mean
-        density of the cost; None to infer it from how far the ends have moved.
     distances: where they are bounded: in "rows", or at "points", which takes several times as long;
         None for rows, and then points if these fail.
     """
 
-    def __init__(
-        self,
-        along: CentralPath | None = None,
-        level: float | None = None,
-        distances: DistancesAt | None = None,
-    ) -> None:
-        self.along = along
-        self.level = level
+    def __init__(self, distances: DistancesAt | None = None) -> None:
         self.distances = distances
 
     def supports(self, problem: TrajectoryProblem) -> bool:
@@ -76,49 +65,49 @@ class InteriorPoint(Method):
     def minimize(
         self,
         problem: TrajectoryProblem,
-        path: DiscretePath,
+        start: Guess,
         criteria: Criteria,
         report: Report | None = None,
     ) -> MethodResult:
-        """See Method.minimize; the guess may violate the limits, and intervals may be split."""
+        """See Method.minimize; intervals may be split."""
         solve = partial(self._solved, report=report)
-        return with_torque_rates_last(solve, problem, path, criteria)
+        return with_torque_rates_last(solve, problem, start, criteria)
 
     def _solved(
         self,
         problem: TrajectoryProblem,
-        path: DiscretePath,
+        start: Guess,
         criteria: Criteria,
         report: Report | None,
     ) -> MethodResult:
         """With rows for distances where pairs come near; in rounds where that is not supported."""
         rounds = partial(with_active_pairs, partial(self._minimize, report=report), report=report)
         if not takes_rows(problem):
-            return rounds(problem, path, criteria)
+            return rounds(problem, start, criteria)
         most = min(STEPS_AT_POINTS, criteria.max_iterations)
         at_points = dataclasses.replace(criteria, max_iterations=most)
         if self.distances == "points":
-            return rounds(problem, path, at_points)
+            return rounds(problem, start, at_points)
         deadline = Deadline(criteria.time_limit)
         if not problem.has_limits:
             free = without_pairs(
-                partial(self._minimize, report=report), problem, path, criteria, report
+                partial(self._minimize, report=report), problem, start, criteria, report
             )
             if free is not None:
                 return free
             criteria = dataclasses.replace(criteria, time_limit=deadline.seconds_left)
-        found = self._minimize(problem, path, criteria, report, lazy=True)
+        found = self._minimize(problem, start, criteria, report, lazy=True)
         if self.distances == "rows" or found.status not in WITHOUT_MOTION:
             return found
         at_points = dataclasses.replace(at_points, time_limit=deadline.seconds_left)
-        again = rounds(problem, path, at_points)
+        again = rounds(problem, start, at_points)
         history = [*found.history, *again.history]
         return dataclasses.replace(again, nit=found.nit + again.nit, history=history)
 
     def _minimize(
         self,
         problem: TrajectoryProblem,
-        path: DiscretePath,
+        start: Guess,
         criteria: Criteria,
         report: Report | None,
         lazy: bool = False,
@@ -126,14 +115,9 @@ class InteriorPoint(Method):
         limits = problem.limits or no_limits(problem.coordinates)
         reason = contradiction(problem, limits)
         if reason:
-            value = cost_of(problem, path)
-            return MethodResult(
-                problem, path, value, Status.INFEASIBLE, infeasible_sentence(reason)
-            )
-        along, level = self.along, self.level
-        search = BoundedSearch(
-            problem, limits, criteria, report, path, along=along, level=level, lazy=lazy
-        )
+            value, message = cost_of(problem, start.x), infeasible_sentence(reason)
+            return MethodResult(problem, start.x, value, Status.INFEASIBLE, message)
+        search = BoundedSearch(problem, limits, criteria, report, start, lazy=lazy)
         try:
             return _searched(search)
         except KeyboardInterrupt:  # between two solves, which handle their own

@@ -31,7 +31,7 @@ from hovi.planning.solver.methods.augmented_lagrangian import (
     constrained_status,
     with_offset,
 )
-from hovi.planning.solver.methods.method import Method, MethodResult, Report
+from hovi.planning.solver.methods.method import Guess, Method, MethodResult, Report
 from hovi.planning.solver.outcome.cost_with_time import price_of_time
 from hovi.system.dataclass import dataclass
 from hovi.system.deadline import Deadline, OutOfTimeError
@@ -59,19 +59,19 @@ class LagrangeNewton(Method):
     def minimize(
         self,
         problem: TrajectoryProblem,
-        path: DiscretePath,
+        start: Guess,
         criteria: Criteria,
         report: Report | None = None,
     ) -> MethodResult:
         """See Method.minimize."""
         rounds = AugmentedLagrangian()
         if problem.unreachable:
-            return rounds.minimize(problem, path, criteria, report)
+            return rounds.minimize(problem, start, criteria, report)
         search = _Search(problem, criteria, report)
-        found = search.run(path)
+        found = search.run(start.x, start.near)
         if found is not None:
             return found
-        result = rounds.minimize(problem, path, search.left, search.report)
+        result = rounds.minimize(problem, start, search.left, search.report)
         history = [*search.history, *result.history]
         said, meant = (f"after {count} steps" for count in (result.nit, len(history)))
         message = result.message.replace(said, meant)
@@ -100,13 +100,13 @@ class _Search:
         """The report, with step numbers that continue."""
         return with_offset(self.on_step, len(self.history))
 
-    def run(self, path: DiscretePath) -> MethodResult | None:
-        """The result; None where the method fails."""
+    def run(self, path: DiscretePath, near: bool) -> MethodResult | None:
+        """The result; None where the method fails. near: whether the path is near a solution."""
         problem = self.problem
         multipliers = None
         saddles: list[float] = []
         objective = ConstrainedAction(problem, path)
-        if self.criteria.near or len(problem.passive) > 0:
+        if near or len(problem.passive) > 0:
             multipliers = self._known(path, objective)
         if multipliers is None and len(problem.passive) == 0:
             first, multipliers = self._first_round(path, objective)

@@ -13,6 +13,7 @@ from hovi.discrete.interval_batch import Jet
 from hovi.optimize.criteria import Criteria
 from hovi.optimize.ended import Iteration
 from hovi.optimize.quadratic_model import QuadraticModel
+from hovi.optimize.start import Start
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.status import Status
 from hovi.scene.lagrangian import PointTerms
@@ -21,6 +22,8 @@ from hovi.system.dataclass import dataclass
 if TYPE_CHECKING:
     from hovi.planning.solver.central_path import CentralPath
 
+Guess = Start[DiscretePath, "CentralPath"]
+"""A motion on the grid of a problem, with the central path of a similar one if it is known."""
 Report = Callable[[int, float], None]
 """Called with the number of each step and the least cost so far."""
 
@@ -70,13 +73,13 @@ class Method(ABC):
     def minimize(
         self,
         problem: TrajectoryProblem,
-        path: DiscretePath,
+        start: Guess,
         criteria: Criteria,
         report: Report | None = None,
     ) -> MethodResult:
         """A motion of least action, from a guess.
 
-        path: the guess, on the problem's grid and with its boundary data.
+        start: the guess, on the problem's grid and with its boundary data. It may violate limits.
         criteria: tolerances, and limits on steps and time. report: see Report.
         A KeyboardInterrupt during the iterations ends the method with the best motion so far.
         """

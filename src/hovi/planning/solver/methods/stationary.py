@@ -13,7 +13,7 @@ from hovi.optimize.criteria import Criteria
 from hovi.optimize.ended import Reason
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.action_objective import ActionObjective
-from hovi.planning.solver.methods.method import Method, MethodResult, Report
+from hovi.planning.solver.methods.method import Guess, Method, MethodResult, Report
 from hovi.planning.solver.outcome.cost_with_time import cost_of
 from hovi.planning.solver.status import Status, chart_sentence, unfinished
 from hovi.system.deadline import Deadline, OutOfTimeError, raise_if_late
@@ -51,12 +51,12 @@ class Stationary(Method):
     def minimize(
         self,
         problem: TrajectoryProblem,
-        path: DiscretePath,
+        start: Guess,
         criteria: Criteria,
         report: Report | None = None,
     ) -> MethodResult:
         """See Method.minimize; what is made small is the gradient."""
-        search = _Search(ActionObjective(problem, "band"), path)
+        search = _Search(ActionObjective(problem, "band"), start.x)
         with Deadline(criteria.time_limit).in_force():
             why = search.run(criteria.max_iterations, report)
         x, value = search.x, cost_of(problem, search.x)

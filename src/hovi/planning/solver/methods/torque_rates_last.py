@@ -16,13 +16,13 @@ from hovi.optimize.criteria import Criteria
 from hovi.planning.problem.limit_violation import closeness
 from hovi.planning.problem.limits import KINDS, Limits
 from hovi.planning.problem.problem import TrajectoryProblem
-from hovi.planning.solver.methods.method import MethodResult
+from hovi.planning.solver.methods.method import Guess, MethodResult
 from hovi.planning.solver.status import Status
 from hovi.scene.jerk_lagrangian import JerkLagrangian
 from hovi.scene.lagrangian import PointTerms
 from hovi.system.deadline import Deadline
 
-Solve = Callable[[TrajectoryProblem, DiscretePath, Criteria], MethodResult]
+Solve = Callable[[TrajectoryProblem, Guess, Criteria], MethodResult]
 TORQUE_RATE = "torque_rate"
 NEAR_A_RATE = 0.02
 """Distance of a guess from the limits on the torque rate, as a share of their range, below which
@@ -30,7 +30,7 @@ they are imposed at once where the guess is the motion of a similar problem."""
 
 
 def with_torque_rates_last(
-    solve: Solve, problem: TrajectoryProblem, path: DiscretePath, criteria: Criteria
+    solve: Solve, problem: TrajectoryProblem, start: Guess, criteria: Criteria
 ) -> MethodResult:
     """The result of a solve without limits on the torque rate; with them if the motion needs them.
 
@@ -40,20 +40,20 @@ def with_torque_rates_last(
     """
     limits, lagrangian = problem.limits, problem.ld.lagrangian
     if limits is None or not isinstance(lagrangian, JerkLagrangian) or not lagrangian.torque_rates:
-        return solve(problem, path, criteria)
-    if criteria.near and _margin(problem, limits, path) < NEAR_A_RATE:
-        return solve(problem, path, criteria)
+        return solve(problem, start, criteria)
+    if start.near and _margin(problem, limits, start.x) < NEAR_A_RATE:
+        return solve(problem, start, criteria)
     deadline = Deadline(criteria.time_limit)
     without = dataclasses.replace(lagrangian, torque_rates=False)
     ld = DiscreteLagrangian(without, problem.grid)
     loose = dataclasses.replace(problem, ld=ld, limits=limits.without(TORQUE_RATE))
     if not loose.limited:
-        return solve(problem, path, criteria)
-    first = solve(loose, path, criteria)
+        return solve(problem, start, criteria)
+    first = solve(loose, start, criteria)
     full = problem.on(first.problem.grid)
     if first.status is Status.MINIMUM and _margin(full, limits, first.path) < -limits.tolerance:
-        left = dataclasses.replace(criteria, time_limit=deadline.seconds_left, near=True)
-        second = solve(full, first.path, left)
+        left = dataclasses.replace(criteria, time_limit=deadline.seconds_left)
+        second = solve(full, dataclasses.replace(start, x=first.path, near=True), left)
         return dataclasses.replace(
             second, nit=first.nit + second.nit, history=[*first.history, *second.history]
         )

@@ -13,7 +13,7 @@ from hovi.optimize.start import Start
 from hovi.optimize.trust_region import minimize
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.action_objective import ActionObjective
-from hovi.planning.solver.methods.method import Method, MethodResult, Report
+from hovi.planning.solver.methods.method import Guess, Method, MethodResult, Report
 from hovi.planning.solver.outcome.cost_with_time import price_of_time
 from hovi.planning.solver.status import chart_sentence, status_of
 from hovi.system.deadline import OutOfTimeError
@@ -29,14 +29,14 @@ class TrustRegion(Method):
     def minimize(
         self,
         problem: TrajectoryProblem,
-        path: DiscretePath,
+        start: Guess,
         criteria: Criteria,
         report: Report | None = None,
     ) -> MethodResult:
         """See Method.minimize."""
         objective = ActionObjective(problem)
         exact = dataclasses.replace(criteria, exact=True)
-        ended = minimize(objective, Start(path), exact, report)
+        ended = minimize(objective, Start(start.x), exact, report)
         n_neg = 0 if ended.convex else negative_eigenvalues(objective, ended)
         cost, nit = ended.value + price_of_time(problem), len(ended.steps)
         status, message = status_of(problem, ended, cost, nit, n_neg)

@@ -86,7 +86,7 @@ def require_known(
     """Raise InputError for options that neither a method of a solution nor a solve has."""
     if not options:
         return
-    solving = [name for name in [*inspect.signature(solve).parameters][2:] if name != "near"]
+    solving = [*inspect.signature(solve).parameters][2:]
     own = [*inspect.signature(method).parameters][1:-1]
     for name in options:
         if name in KEPT_OPTIONS:
