@@ -21,7 +21,7 @@ from compared_cases import (
     judged_motion,
     no_bounds,
 )
-from outside_judge import ROWS, Asked, LedBack, carrying, denial, oracle_model
+from outside_judge import MAX_DIFFERENCE, ROWS, Asked, LedBack, carrying, denial, oracle_model
 from twelve_arms import ARMS, load, reaches
 
 import hovi
@@ -38,6 +38,8 @@ FREE = 0.5, 3.0
 """Bounds of free durations, in times those of the reaches."""
 WEIGHTS = 1.0, 100.0
 """Bounds of the weights of time."""
+MINIMA = "minimum", "unresolved"
+"""Statuses of a solve that ends in a minimum of its grid."""
 SEQUENCES = 25
 LOADS = {"ur5": 1.0, "panda": 0.5, "z1": 0.2, "xarm7": 0.5, "tiago": 0.3}
 """Arms of the sequences, and what they carry, in [kg]."""
@@ -63,7 +65,29 @@ def _reach_cases(limits: str, group: Group, seed: int) -> Iterator[Case]:
     for name, (start, goal, T) in zip(group.names, drawn, strict=True):
         asked = asked_between(scene, at_rest(start), at_rest(goal), T, limits)
         solve = partial(hovi.plan, scene, start, goal, T, limits=limits, **ALONE)
-        yield Case((name,), solve, judged_motion(asked))
+        judge = judged_motion(asked) if limits == "urdf" else partial(_judged_by_finer, asked)
+        yield Case((name,), solve, judge)
+
+
+def _judged_by_finer(asked: Asked, found: Outcome) -> str:
+    """The judgement of a motion without limits, which may swing between the points of its grid.
+
+    As in resolved_reaches.py, a solve on four times as many intervals, started from it, confirms it
+    if it ends in nearly the same cost: on equal ones, or on its own cut into four.
+    """
+    said = denial(found.motion, found.cost, asked)
+    if said:
+        return said
+    grid, cost, said = found.motion.grid, found.cost or 0.0, ""
+    equal = hovi.Grid.uniform(grid.duration, 4 * grid.intervals, hovi.schemes.by_name("galerkin-2"))
+    for finer in (equal, grid.halved().halved()):
+        problem = found.solution.problem.on(finer)
+        again = hovi.solve(problem, found.motion, max_iterations=2_000)
+        change = again.cost / cost - 1.0
+        if str(again.status) in MINIMA and abs(change) <= MAX_DIFFERENCE:
+            return ""
+        said = f"finer: {again.status}, cost {change:+.1e}"
+    return said
 
 
 # Motions that go on from others
