@@ -393,3 +393,18 @@ def test_the_first_grids_are_those_that_the_page_on_tolerances_states(
         grid = found.trajectory.grid
         assert grid.intervals == accuracy_of(found).rounds[0].intervals == most
         assert {each.name for each in grid.schemes} <= {scheme, "galerkin-4x10"}
+
+
+@pytest.mark.parametrize("objective", ["effort", "acceleration"])
+def test_within_limits_grids_are_refined_whatever_the_objective(
+    arm_scene: Scene, objective: str
+) -> None:
+    """Also where no torque has a weight, whose differences are what an interval contributes."""
+    given = {"limits": {"base": "none", "v": 2.2}, "objective": objective, "intervals": 6}
+    found = plan(arm_scene, HANG, REACH_Q, 1.0, tolerance=1e-4, **given)
+    fine = plan(arm_scene, HANG, REACH_Q, 1.0, scheme="galerkin-2x8", **(given | {"intervals": 96}))
+    accuracy = accuracy_of(found)
+    assert accuracy.reached
+    assert len(accuracy.rounds) == 2
+    assert accuracy.rounds[1].points > accuracy.rounds[0].points
+    assert abs(found.cost / fine.cost - 1) <= 1e-4

@@ -13,6 +13,7 @@ import hovi
 from hovi import Solution, certify, estimate_error, plan
 from hovi.cli.reports.certificate import certificate_lines
 from hovi.discrete.curve_integral import integral_along
+from hovi.discrete.guess import regularized
 from hovi.discrete.state import State
 from hovi.effects import Armature, Custom, Gravity, ViscousFriction, Wrench
 from hovi.errors import InputError
@@ -171,6 +172,41 @@ def test_the_equations_hold_at_a_solution_and_not_elsewhere(
     residual = certify(stopped).residual
     assert residual is not None
     assert residual > 1e-3
+
+
+@pytest.mark.parametrize("node", [1, 3, 7])
+def test_the_residual_is_the_largest_jump_of_the_momenta_at_any_node(
+    arm_scene: Scene, node: int
+) -> None:
+    """At a motion with one node out of place, by the derivatives of the discrete Lagrangian."""
+    solution = reach(arm_scene, intervals=8)
+    assert solution.problem is not None
+    problem, path = solution.problem, solution.trajectory.path
+    q = path.q.copy()
+    q[node] += 1e-3
+    z = regularized(problem.robot, problem.grid, q, path.v)
+    moved = dataclasses.replace(path, q=q, z=z)
+    D = problem.ld.derivatives(moved)
+    jumps = np.abs(D[:-1, 2:] + D[1:, :2])
+    sizes = [max(np.abs(D[:, [i, i + 2]]).max(), 1e-300) for i in (0, 1)]
+    expected = max(float(jumps[:, i].max() / sizes[i]) for i in (0, 1))
+    found = certify(
+        dataclasses.replace(solution, trajectory=problem.trajectory(moved)), estimate=False
+    )
+    assert found.residual == pytest.approx(expected, rel=1e-9)
+    assert expected > 1e-4
+
+
+def test_a_curve_beyond_a_limit_has_no_bound(arm_scene: Scene) -> None:
+    """The limits are narrowed after the plan, by a thousandth."""
+    found = reach(arm_scene, limits={"base": "none", "v": 5.0})
+    assert found.problem is not None
+    assert found.problem.limits is not None
+    assert certify(found, estimate=False).bound is not None
+    narrow = dataclasses.replace(found.problem, limits=found.problem.limits.with_margin(1e-3))
+    certificate = certify(dataclasses.replace(found, problem=narrow), estimate=False)
+    assert certificate.bound is None
+    assert "the curve exceeds a limit by" in certificate.missing["bound"]
 
 
 def test_peaks_lie_between_the_nodes_too(arm_scene: Scene) -> None:
