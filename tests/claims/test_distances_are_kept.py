@@ -98,6 +98,24 @@ def test_the_cost_changes_with_the_duration_as_the_multipliers_say(name: str) ->
     assert found.duration_derivative == pytest.approx(slope, rel=0.01)
 
 
+def test_momenta_at_a_node_are_those_of_both_intervals_with_what_keeps_the_distance() -> None:
+    """At the node where an interval begins that touches the margin, after one that does not."""
+    task = hovi.load_task(hovi.example("ur5_around_sphere"))
+    found = hovi.plan_task(task, intervals=24, limits={"base": "none", "a": 5e3})
+    assert found.success, found.message
+    assert found.problem is not None
+    motion, N = found.trajectory, found.trajectory.grid.intervals
+    distances = Distances(task.scene.robot, task.options.clearance)
+    k, s = np.repeat(np.arange(N), 60), np.tile(np.linspace(0.0, 1.0, 60), N)
+    gap = distances.values(motion.sample_intervals(k, s).q).min(axis=1)
+    gap = gap.reshape(N, 60).min(axis=1) - float(task.options.clearance.margin)
+    after = 1 + np.flatnonzero(gap[:-1] > 2e-3)
+    assert (gap[after] < 5e-4).any()
+    before = found.problem.ld.derivatives(motion.path)[after - 1, 2]
+    size = np.abs(before).max()
+    np.testing.assert_allclose(motion.momenta[after, 0], before, rtol=0, atol=1e-6 * size)
+
+
 @pytest.mark.parametrize("name", ROBOTS)
 def test_a_motion_through_a_ball_goes_around_it(name: str) -> None:
     """The tool itself would pass through its middle."""
