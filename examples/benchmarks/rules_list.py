@@ -392,10 +392,10 @@ _rule(
     "False",
 )
 _rule(
-    "hand over multipliers",
-    "New rows outside their bounds take over the forces of rows beside them.",
+    "transfer multipliers",
+    "New rows outside their bounds take over the multipliers of rows near them.",
     "_Iteration._replaced",
-    "found.handed is not None",
+    "found.transfer is not None",
     "False",
 )
 _rule(
@@ -856,10 +856,10 @@ _rule(
 )
 _at("distances", "planning.solver.methods.feasibility")
 _rule(
-    "beside obstacles",
+    "among obstacles",
     "At the points, a guess free of obstacles is taken as near a solution.",
     "feasible_motion",
-    "_solved_beside_obstacles(search, path, search.clearance)",
+    "_solved_among_obstacles(search, path, search.clearance)",
     "None",
     False,
 )
@@ -1002,8 +1002,8 @@ _rule(
     "warm where tightened",
     "A solve with tighter bounds begins with the last slacks and multipliers.",
     "_solved_tighter",
-    "barrier.warm(objective.bounds, y, mu) if len(y) == len(barrier.s) else None",
-    "None",
+    "len(y) == len(barrier.s)",
+    "False",
 )
 _rule(
     "few steps where the duration moves",

@@ -106,35 +106,27 @@ class Barrier:
         y: Array,
         mu: float,
         scale: float | None = None,
-        margin: float = INITIAL_MARGIN,
+        margin: float | Array = INITIAL_MARGIN,
+        known: Barrier | None = None,
     ) -> Barrier:
-        """Slacks at y, clipped to a margin inside the bounds; multipliers on the central path."""
+        """Slacks at y, clipped to a margin inside the bounds; multipliers on the central path.
+
+        scale: 10 mu if None. margin: relative to the range. known: of a nearby solution, whose
+        multipliers are kept where they are larger, for a warm start; its scale is kept, too.
+        """
         inside = np.minimum(margin, MOST_MARGIN * (bounds.upper - bounds.lower))
         s = np.clip(y, bounds.lower + inside, bounds.upper - inside)
-        return cls._at(bounds, s, mu, 10.0 * mu if scale is None else scale)
-
-    @classmethod
-    def _at(cls, bounds: Bounds, s: Array, mu: float, scale: float) -> Barrier:
         below, above = _gaps(bounds, s)
-        return cls(bounds, s, mu / below, mu / above, mu, scale)._clipped()
+        zl, zu = mu / below, mu / above
+        if known is not None:
+            zl, zu, scale = np.maximum(known.zl, zl), np.maximum(known.zu, zu), known.scale
+        return cls(bounds, s, zl, zu, mu, 10.0 * mu if scale is None else scale)._clipped()
 
     @classmethod
     def inactive(cls, bounds: Bounds, y: Array) -> Barrier:
         """Without forces, at outputs that may be outside: those of a point that is no solution."""
         none = np.zeros_like(y)
         return cls(bounds, y, none, none, 0.0, 1.0)
-
-    def warm(
-        self, bounds: Bounds, y: Array, mu: float, margin: float = WARM_START_MARGIN
-    ) -> Barrier:
-        """A warm start from this solution, for bounds or outputs that changed little.
-
-        margin: least distance of the slacks from their bounds, relative to the range.
-        """
-        s = np.clip(y, bounds.lower + margin, bounds.upper - margin)
-        below, above = _gaps(bounds, s)
-        zl, zu = np.maximum(self.zl, mu / below), np.maximum(self.zu, mu / above)
-        return dataclasses.replace(self, bounds=bounds, s=s, zl=zl, zu=zu, mu=mu)._clipped()
 
     def refined(
         self, bounds: Bounds, y: Array, kept: Index, origin: Index, before: Array
@@ -150,31 +142,29 @@ class Barrier:
         margin = float(np.clip(ADDED_MARGIN * self.mu / self.scale, 1e-10, INITIAL_MARGIN))
         inside = np.where(np.arange(len(y)) >= old, margin, 0.0)
         s = np.append(self.s[kept] + self._moved_inside(y[:old] - before, kept), y[old:])
-        whole = Barrier._at(
-            bounds, np.clip(s, bounds.lower + inside, bounds.upper - inside), self.mu, self.scale
-        )
+        whole = Barrier.central(bounds, s, self.mu, self.scale, inside)
         for z, former in ((whole.zl, self.zl), (whole.zu, self.zu)):
             z[:old] = former[kept]
             z[old:][known] = np.maximum(z[old:][known], former[origin[known]])
         return whole._clipped()
 
-    def handed_on(self, y: Array, new: Index, beside: Index) -> Barrier:
-        """New outputs that are below their lower bounds take over the forces of those beside them.
+    def transferred(self, y: Array, new: Index, nearby: Index) -> Barrier:
+        """New outputs below their lower bounds take over the multipliers of kept ones near them.
 
-        It is foreseen that all of these rise together until the new ones are at their bounds:
-        slacks are where they will be then, with products z gap of mu.
-        y: outputs, (R,). new, beside: see Refinement.handed.
+        We assume that all of these increase together until the new ones reach their bounds: slacks
+        are where they will be then, with products z gap of mu.
+        y: outputs, (R,). new, nearby: see Refinement.transfer.
         """
         rise = np.maximum(self.bounds.lower[new] - y[new], 0.0)
         below = rise > 0.0
-        new, beside, rise = new[below], beside[below], rise[below]
+        new, nearby, rise = new[below], nearby[below], rise[below]
         s, zl = self.s.copy(), self.zl.copy()
         zl[new] = 0.0
-        np.add.at(zl, new, self.zl[beside])
+        np.add.at(zl, new, self.zl[nearby])
         zl[new] = np.maximum(zl[new], self.mu / INITIAL_MARGIN)
         s[new] = self.bounds.lower[new] + self.mu / zl[new]
-        s[beside] = self.s[beside] + rise
-        zl[beside] = self.mu / (s[beside] - self.bounds.lower[beside])
+        s[nearby] = self.s[nearby] + rise
+        zl[nearby] = self.mu / (s[nearby] - self.bounds.lower[nearby])
         return dataclasses.replace(self, s=s, zl=zl)._clipped()
 
     def _moved_inside(self, change: Array, kept: Index) -> Array:

@@ -78,8 +78,8 @@ is), the number of such steps in a row after which the barrier parameter is rais
 fallen too early, and the factor by which it is raised."""
 LEAST_RAISED_GAP = 1e-9
 """Least distance of slacks from their bounds after that, relative to the range."""
-MOST_HANDED = 5e-3
-"""How far outside its bounds a new output may be that takes over the forces of those beside it."""
+MOST_TRANSFERRED = 5e-3
+"""How far outside its bounds a new output may be to which multipliers are transferred."""
 OUTSIDE_RADIUS = 3.0
 """Radius to which the trust region is cut where outputs are added outside of their bounds; the one
 before is restored once outputs are matched."""
@@ -373,15 +373,16 @@ class _Iteration(BoundedSteps[X]):
         if beyond[len(found.kept) :].any():
             self.radius_to_restore = max(self.radius, self.radius_to_restore)
             self.radius = min(self.radius, OUTSIDE_RADIUS)
-        if found.handed is not None:
-            new, beside = found.handed
-            near = beyond[new] <= MOST_HANDED
-            barrier = barrier.handed_on(outputs.y, new[near], beside[near])
+        if found.transfer is not None:
+            new, nearby = found.transfer
+            near = beyond[new] <= MOST_TRANSFERRED
+            barrier = barrier.transferred(outputs.y, new[near], nearby[near])
             beyond[new[near]] = 0.0
         outside = float(beyond[len(found.kept) :].max(initial=0.0))
         mu = min(REOPENED * outside, MOST_REOPENED) * self.density
         if mu > barrier.mu:  # room for the others to move
-            barrier = barrier.warm(barrier.bounds, outputs.y, mu, REOPENED * outside)
+            margin = REOPENED * outside
+            barrier = Barrier.central(barrier.bounds, outputs.y, mu, None, margin, barrier)
         ended.outputs, ended.kept = outputs, kept
         self.product = barrier.mean_product()
         ended.z = barrier.with_mu(max(barrier.mu, self.product))

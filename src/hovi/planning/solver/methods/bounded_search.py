@@ -251,7 +251,8 @@ class BoundedSearch:
             y, barrier = ended.outputs.y, ended.z
             z = None
             if len(y) == len(barrier.s) == len(objective.bounds.lower):
-                z = barrier.warm(objective.bounds, y, mu, min(share, WARM_START_MARGIN))
+                margin = min(share, WARM_START_MARGIN)
+                z = Barrier.central(objective.bounds, y, mu, None, margin, barrier)
             return ended
 
         rounds = minimize_constrained(self.problem, start.x, minimize_round, self.multipliers)

@@ -55,7 +55,7 @@ def feasible_motion(search: BoundedSearch) -> tuple[Bounded, str]:
     """A motion from the guess within bounds at points and control points, or why there is none."""
     path, ended = search.guess, None
     if search.clearance is not None:
-        ended = _solved_beside_obstacles(search, path, search.clearance)
+        ended = _solved_among_obstacles(search, path, search.clearance)
         if ended is None:
             path = _moved_out_of_obstacles(search, path, search.clearance)
     moved = None if path is search.guess else path
@@ -214,7 +214,7 @@ def _solved_warm(search: BoundedSearch, known: Barrier, path: DiscretePath) -> B
     z = None
     if len(known.s) == len(outputs.y):
         mu *= outputs.density(objective.bounds.measure)
-        z = known.warm(objective.bounds, outputs.y, mu, WARM_MARGIN)
+        z = Barrier.central(objective.bounds, outputs.y, mu, None, WARM_MARGIN, known)
     ended = search.solve(Start(path, z))
     search.criteria = whole
     return ended
@@ -237,10 +237,10 @@ def solved_from(search: BoundedSearch, path: DiscretePath) -> Bounded:
     return search.solve(search.start_at(path, NEARBY_MU, search.objective(search.multipliers)))
 
 
-def _solved_beside_obstacles(
+def _solved_among_obstacles(
     search: BoundedSearch, path: DiscretePath, wanted: ClearanceOutputs
 ) -> Bounded | None:
-    """The solution beside a guess free of obstacles; None if it is not free, or that fails."""
+    """The solution near a guess free of obstacles; None if it is not free, or that fails."""
     given = approach_along(search.problem.trajectory(path), wanted.distances, wanted.least)
     if float(given.distance.min()) < wanted.least:
         return None

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.discrete.guess import stretched
+from hovi.optimize.barrier import WARM_START_MARGIN, Barrier
 from hovi.optimize.ended import STOPPED, Reason
 from hovi.optimize.start import Start
 from hovi.planning.solver.methods.bounded_search import (
@@ -106,7 +107,9 @@ def _solved_tighter(search: BoundedSearch, ended: Bounded, sides: Array) -> Boun
     share = float(np.clip(1e-2 * float(sides.max()), *WARM_MU_RANGE))
     mu = share * ended.outputs.density(objective.bounds.measure)
     y, barrier = objective.outputs(ended.x).y, ended.z
-    z = barrier.warm(objective.bounds, y, mu) if len(y) == len(barrier.s) else None
+    z = None
+    if len(y) == len(barrier.s):
+        z = Barrier.central(objective.bounds, y, mu, None, WARM_START_MARGIN, barrier)
     whole = search.criteria
     if search.timed:
         most = min(TIMED_STEPS, whole.max_iterations)

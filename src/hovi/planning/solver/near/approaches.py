@@ -179,11 +179,11 @@ def _around(at: Array, columns: Index, d: Array, below: float) -> tuple[Array, I
         bend = max((before - 2.0 * here + after) * (SAMPLES / apart) ** 2, 1e-9)
         step = float(np.clip(np.sqrt(8.0 * DIP / bend), CLOSEST, WIDEST))
         steps = step * np.arange(1, int(AROUND / step) + 1)
-        beside = np.concatenate([t - steps, t + steps])
-        inside = (beside > CLOSEST) & (beside < samples[-1] - CLOSEST)
-        beside = beside[inside & (np.interp(beside, samples, d[:, column]) < below)]
-        positions.append(beside)
-        numbers.append(np.full(len(beside), column))
+        around = np.concatenate([t - steps, t + steps])
+        inside = (around > CLOSEST) & (around < samples[-1] - CLOSEST)
+        around = around[inside & (np.interp(around, samples, d[:, column]) < below)]
+        positions.append(around)
+        numbers.append(np.full(len(around), column))
     return np.concatenate(positions), np.concatenate(numbers)
 
 

@@ -48,8 +48,8 @@ MOST_INFLATION = 10.0
 """Bound of what a rounded distance is shorter by, relative to the size."""
 WEIGHT = 0.1
 """Weight of a row in a barrier, as a share of the interval."""
-BESIDE = 0.3
-"""Distance up to which a row is beside a new one, relative to the interval."""
+NEARBY = 0.3
+"""Distance up to which a row is near a new one, relative to the interval."""
 GUARD = 0.05
 """Distance beyond the least one below which pairs get rows at once, in [m]."""
 
@@ -62,7 +62,7 @@ class ClearanceRows:
     problem: with the grid and the ends. distances: of all pairs. least: lower bound, in [m].
     intervals, positions, pairs, rounding: of each row, shape (E,): its interval, where it is in it,
         from 0 to 1, the number of its pair, and the size by which its shapes are rounded, in [m].
-    handed: see Refinement; numbers among these rows. order: see `stand_behind`.
+    transfer: see Refinement; numbers among these rows. order: see `stand_behind`.
     fixed: whether rows stay as they are. guard: distance beyond the least one below which `follow`
         adds rows, in [m]. probing, blocked: see `extend`. watchful: whether pairs are followed even
         before there are any rows.
@@ -71,7 +71,7 @@ class ClearanceRows:
     def __init__(self, problem: TrajectoryProblem, distances: Distances, least: float) -> None:
         self.distances, self.least = distances, least
         self.fixed, self.guard = False, GUARD
-        self.handed: tuple[Index, Index] | None = None
+        self.transfer: tuple[Index, Index] | None = None
         self.probing = self.blocked = self.watchful = False
         self.order: Index = np.zeros(0, dtype=np.intp)
         self._followed: LimitRows | None = None
@@ -264,7 +264,7 @@ class ClearanceRows:
         both = (self.intervals, k), (self.positions, found.at - k), (self.pairs, found.pairs)
         intervals, positions, pairs = (np.concatenate(each) for each in both)
         added = len(found.pairs)
-        self.handed = self._beside(found)
+        self.transfer = self._nearby(found)
         rounding = np.append(self.rounding, np.full(added, LEAST_ROUNDING))
         before = self._measured if problem is self._problem else RecentPaths[Array]()
         normals = np.concatenate([self._normals, np.zeros((added, 3))])
@@ -277,17 +277,17 @@ class ClearanceRows:
         self.order = np.append(self.order, len(self.order) + np.arange(added))
         return added
 
-    def _beside(self, found: Approaches) -> tuple[Index, Index]:
-        """Numbers of new rows at approaches, and of the rows beside them of the same pairs.
+    def _nearby(self, found: Approaches) -> tuple[Index, Index]:
+        """Numbers of new rows at approaches, and of the rows near them of the same pairs.
 
-        Each of these is beside the nearest new row, at most BESIDE of an interval away.
+        Each of these belongs to the nearest new row, at most NEARBY of an interval away.
         """
         own = self.intervals + self.positions
         new, old = [np.zeros(0, dtype=np.intp)], [np.zeros(0, dtype=np.intp)]
         for pair in np.intersect1d(found.pairs, self.pairs):
             here, there = np.flatnonzero(found.pairs == pair), np.flatnonzero(self.pairs == pair)
             apart = np.abs(found.at[here][:, None] - own[there])
-            near = apart.min(axis=0) <= BESIDE
+            near = apart.min(axis=0) <= NEARBY
             new.append(self.size + here[apart.argmin(axis=0)[near]])
             old.append(there[near])
         return np.concatenate(new), np.concatenate(old)

@@ -214,16 +214,16 @@ class ClearedAction(BoundedAction):
             np.append(np.arange(first), first + remaining),
             np.append(origins, np.full(added, -1)),
         )
-        return Refinement(*both, self._handed() if added else None)
+        return Refinement(*both, self._transfer() if added else None)
 
-    def _handed(self) -> tuple[Index, Index] | None:
-        """Outputs of the rows of distances that were added last, and of those beside them."""
-        if self.near.handed is None or self.rows is None:
+    def _transfer(self) -> tuple[Index, Index] | None:
+        """Outputs of the rows of distances that were added last, and of kept ones near them."""
+        if self.near.transfer is None or self.rows is None:
             return None
         slots = np.empty(len(self.near.order), dtype=np.intp)
         slots[self.near.order] = self._point_count + np.arange(len(slots))
-        new, beside = (slots[self.rows.size + each] for each in self.near.handed)
-        return new, beside
+        new, nearby = (slots[self.rows.size + each] for each in self.near.transfer)
+        return new, nearby
 
     @property
     def _limit_count(self) -> int:

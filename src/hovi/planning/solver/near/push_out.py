@@ -26,7 +26,7 @@ Index = npt.NDArray[np.intp]
 Mask = npt.NDArray[np.bool_]
 
 WAVES, MOST_WAVES = 12, 60
-"""Number of functions of time, besides one for each free end, and the largest one with seams."""
+"""Number of functions of time, without one for each free end, and the largest one with seams."""
 SAMPLES = 64, 256
 """Least and largest number of times at which distances are looked at."""
 STEP = 0.02
