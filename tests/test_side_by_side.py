@@ -189,6 +189,7 @@ FALSE = {"denied": "v beyond its limits by 1e-03"}
     ("before", "after", "bits", "faults"),
     [
         (rows(), rows(), True, []),
+        ({}, {}, False, ["nothing measured"]),
         (rows(), changed("3", **LOST), False, ["lost success"]),
         (rows(), changed("3", **GONE), False, ["lost success"]),
         (rows(), {k: v for k, v in rows().items() if k != "3"}, False, ["lost success"]),

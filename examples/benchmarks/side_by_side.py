@@ -16,7 +16,8 @@ class of problems passes if
 
 Kernel points are those at which torques were evaluated, and calls the function calls of a few
 problems under a profiler. `--save FILE` keeps what BEFORE did, and `--load FILE` takes it from
-there instead. The exit code is 1 if a class does not pass.
+there instead. Ctrl-C ends the measurement and prints what there is. The exit code is 1 if a class
+does not pass.
 """
 
 from __future__ import annotations
@@ -73,6 +74,7 @@ class Worker:
     def __init__(self, checkout: Path, log: Path) -> None:
         self._checkout, self._log = checkout, log
         self._process: subprocess.Popen[str] | None = None
+        self._ended_for_good = False
         self._lines: queue.Queue[str | None] = queue.Queue()
 
     def _start(self) -> subprocess.Popen[str]:
@@ -92,6 +94,11 @@ class Worker:
         threading.Thread(target=_forward, args=(process.stdout, lines), daemon=True).start()
         self._lines = lines
         return process
+
+    def end(self) -> None:
+        """End the process, and start none any more."""
+        self._ended_for_good = True
+        self.close()
 
     def close(self) -> None:
         """End the process."""
@@ -133,8 +140,8 @@ class Worker:
 
     def _ended(self) -> str:
         """How the process ended, in a word."""
-        assert self._process is not None
-        code = self._process.wait()
+        process = self._process
+        code = 0 if process is None else process.wait()
         self.close()
         return "time-out" if -code in (signal.SIGXCPU, signal.SIGKILL) else f"crash ({code})"
 
@@ -154,7 +161,7 @@ class Worker:
         """The rows of a group, by name; problems in which the process dies are without success."""
         rows: dict[str, Row] = {}
         patience = PATIENCE * group["limit"] + 600.0
-        while True:
+        while not self._ended_for_good:
             request = {"group": group, "seed": seed, "skip": list(rows), "known": known}
             begun: list[str] = []
             for answer in self.ask(request, patience):
@@ -170,6 +177,7 @@ class Worker:
                     rows[answer["name"]] = answer
             else:
                 return rows
+        raise KeyboardInterrupt
 
 
 def _forward(stream: Any, lines: queue.Queue[str | None]) -> None:
@@ -250,11 +258,11 @@ class Lane:
     before: Worker | None
     after: Worker
 
-    def close(self) -> None:
+    def end(self) -> None:
         """End both."""
         for worker in (self.before, self.after):
             if worker is not None:
-                worker.close()
+                worker.end()
 
 
 @dataclass
@@ -325,8 +333,14 @@ def measured(
             print(words, file=sys.stderr, flush=True)
 
     with ThreadPoolExecutor(len(lanes)) as pool:
-        for future in [pool.submit(work, *each) for each in enumerate(groups)]:
-            future.result()
+        try:
+            for future in [pool.submit(work, *each) for each in enumerate(groups)]:
+                future.result()
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            for lane in lanes:
+                lane.end()
+            raise
 
 
 # Verdicts
@@ -378,6 +392,7 @@ def verdict(kind: str, before: dict[str, Row], after: dict[str, Row], bits: bool
     other = [y["name"] for x, y in pairs if not same_bits(x, y)]
     other += [name for name in names if name not in before or name not in after]
     faults = {
+        "nothing measured": [] if pairs else [""],
         "false success": [f"{row['name']} ({row['denied']})" for row in false],
         "lost success": [f"{name} ({after.get(name, {}).get('status')})" for name in lost],
         f"steps {steps.median:.3f} in the median": [""] if steps.median > MAX_STEPS else [],
@@ -525,20 +540,24 @@ def compared(given: argparse.Namespace, before: Path | None, saved: dict[str, An
             )
             for i in range(given.jobs)
         ]
-        rows = Measurement(given.seed, known)
+        rows, interrupted = Measurement(given.seed, known), False
         try:
             groups = lanes[0].after.groups(given.only, given.quick)
             measured(lanes, groups, rows)
             for _ in range(AGAIN):
                 measured(lanes, _to_repeat(rows, groups), rows)
+        except KeyboardInterrupt:
+            interrupted = True
+            print("Interrupted: what follows is of the problems so far.\n")
         finally:
             for lane in lanes:
-                lane.close()
+                lane.end()
     size = saved.get("statements") if before is None else solving_statements(before)
     if given.save is not None:
         table = {"seed": given.seed, "quick": given.quick, "statements": size}
         given.save.write_text(json.dumps(table | {"before": given.before, "rows": rows.before}))
-    return report(rows, given.only, given.bits, [size or 0, solving_statements(after)])
+    passes = report(rows, given.only, given.bits, [size or 0, solving_statements(after)])
+    return passes and not interrupted
 
 
 def _to_repeat(rows: Measurement, groups: list[dict[str, Any]]) -> list[dict[str, Any]]:
