@@ -6,7 +6,8 @@ import dataclasses
 
 from hovi.optimize.criteria import Criteria
 from hovi.planning.problem.problem import TrajectoryProblem
-from hovi.planning.solver.methods.method import Guess, Method, MethodResult, Report
+from hovi.planning.solver.answer import Answer
+from hovi.planning.solver.methods.method import Guess, Method, Report
 from hovi.planning.solver.status import Status
 from hovi.system.deadline import Deadline
 
@@ -20,7 +21,7 @@ def minimized(
     start: Guess,
     criteria: Criteria,
     report: Report | None,
-) -> MethodResult:
+) -> Answer:
     """The result of a method, with a longer way back of the start if it finds no motion."""
     deadline = Deadline(criteria.time_limit)
     found = method.minimize(problem, start, criteria, report)
@@ -31,7 +32,5 @@ def minimized(
         longer = dataclasses.replace(limits, window=2.0 * limits.window)
         problem = dataclasses.replace(problem, limits=longer)
         left = dataclasses.replace(criteria, time_limit=deadline.seconds_left)
-        again = method.minimize(problem, start, left, report)
-        history = [*found.history, *again.history]
-        found = dataclasses.replace(again, nit=found.nit + again.nit, history=history)
+        found = method.minimize(problem, start, left, report).after(found)
     return found

@@ -28,14 +28,13 @@ from hovi.planning.problem.notation.ends import End
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.problem.tolerance import LAST_BARRIER, REMAINING_SHARE, Accuracy
 from hovi.planning.problem.units import as_time_limit, seconds
+from hovi.planning.solver.answer import Answer
 from hovi.planning.solver.initial_path import guess_path, turned_on
 from hovi.planning.solver.limits.row_forces import at_instants
 from hovi.planning.solver.longer_way_back import minimized
 from hovi.planning.solver.methods.choice import method_for
-from hovi.planning.solver.methods.method import Method, MethodResult, Report
-from hovi.planning.solver.methods.result_motion import motion_of
+from hovi.planning.solver.methods.method import Method, Report
 from hovi.planning.solver.methods.stationary import Stationary
-from hovi.planning.solver.outcome.cost_with_time import cost_of
 from hovi.planning.solver.outcome.judge import judged
 from hovi.planning.solver.outcome.solution_summary import SolutionSummary
 from hovi.planning.solver.receding.braking import BRAKES, braking
@@ -284,7 +283,7 @@ class _Again:
         if begun and (stopped := self._at_rest(Status.TIME_LIMIT, said, steps)):
             return stopped
         result = last_motion(self.problem, self.path, self.central, steps, last)
-        return dataclasses.replace(solution_of(result, 0.0, 0.0), check=self.check)
+        return dataclasses.replace(solution_of(result), check=self.check)
 
     def _at_rest(self, status: Status, message: str, steps: int) -> Solution | None:
         """A braking motion, unless the last motion is one from the start; None if none is found."""
@@ -293,9 +292,9 @@ class _Again:
         stopped = None if unlimited else braking(problem)
         if stopped is None:
             return None
-        found = stopped.problem, stopped.path, cost_of(stopped.problem, stopped.path)
-        result = MethodResult(*found, status, f"{message} {BRAKES}", steps, central=self.central)
-        return dataclasses.replace(solution_of(result, 0.0, 0.0), check=self.check)
+        said = f"{message} {BRAKES}"
+        result = Answer.at(*stopped, status, said, steps, self.central)
+        return dataclasses.replace(solution_of(result), check=self.check)
 
     def _solved(self, time_limit: float | None, options: dict[str, Any]) -> Solution:
         problem, path, goal = self.problem, self.path, self.problem.goal
@@ -372,13 +371,13 @@ def solve_on_grid(
     return solution_of(result, started - began, time.perf_counter() - started)
 
 
-def solution_of(result: MethodResult, setup_seconds: float, solve_seconds: float) -> Solution:
-    """The result as a Solution."""
+def solution_of(result: Answer, setup_seconds: float = 0.0, solve_seconds: float = 0.0) -> Solution:
+    """The answer as a Solution."""
     return Solution(
         success=result.status in (Status.MINIMUM, Status.STATIONARY),
         status=result.status,
         message=result.message,
-        trajectory=motion_of(result),
+        trajectory=result.motion,
         cost=result.cost,
         nit=result.nit,
         n_neg=result.n_neg,
@@ -395,8 +394,8 @@ def solution_of(result: MethodResult, setup_seconds: float, solve_seconds: float
     )
 
 
-def _the_guess(problem: TrajectoryProblem, path: DiscretePath, why: Reason) -> MethodResult:
+def _the_guess(problem: TrajectoryProblem, path: DiscretePath, why: Reason) -> Answer:
     """The guess, if a solve was stopped before any step."""
     status, reason = unfinished(why)
     message = f"{reason}; the motion is the guess."
-    return MethodResult(problem, path, cost_of(problem, path), status, message)
+    return Answer.at(problem, path, status, message)

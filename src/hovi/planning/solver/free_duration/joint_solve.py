@@ -16,11 +16,12 @@ from hovi.planning.problem.limits import Limits
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.problem.tolerance import LAST_BARRIER
 from hovi.planning.solver.action_objective import MAX_BAND_INTERVALS
+from hovi.planning.solver.answer import Answer
 from hovi.planning.solver.free_duration.timed_action import TimedAction
 from hovi.planning.solver.free_duration.timed_path import TimedPath, TimePrice, stretched_path
 from hovi.planning.solver.free_duration.timed_search import minimum_within_limits
-from hovi.planning.solver.methods.method import Guess, MethodResult
-from hovi.planning.solver.outcome.cost_with_time import cost_of, price_of_time
+from hovi.planning.solver.methods.method import Guess
+from hovi.planning.solver.outcome.cost_with_time import price_of_time
 from hovi.planning.solver.solver import STATIONARY_DECREASE, Solution, solution_of
 from hovi.planning.solver.status import Status, chart_sentence, status_of
 from hovi.system.blas_threads import one_blas_thread
@@ -97,7 +98,7 @@ def _within(
 
 def _unlimited(
     problem: TrajectoryProblem, guess: DiscretePath, price: TimePrice, criteria: Criteria
-) -> MethodResult:
+) -> Answer:
     """By the trust region."""
     objective = TimedAction(problem, price)
     ended = minimize(objective, Start(TimedPath(guess, problem.grid.duration)), criteria)
@@ -109,7 +110,7 @@ def _unlimited(
     status, message = status_of(final, at_end, cost, nit, n_neg)
     message += chart_sentence(final, path)
     moved = final.moved(path)
-    return MethodResult(final, moved, cost, status, message, nit, n_neg, ended.steps)
+    return Answer(final, moved, cost, status, message, nit, n_neg, ended.steps)
 
 
 def _limited(
@@ -118,14 +119,13 @@ def _limited(
     start: Guess,
     price: TimePrice,
     criteria: Criteria,
-) -> MethodResult:
+) -> Answer:
     """By the interior point, unless limits and ends contradict each other for all durations."""
     longest = problem.on(problem.grid.stretched(price.upper))
     reason = contradiction(longest, limits)
     if reason:
         message = f"no motion within the limits was found: {reason}."
-        value = cost_of(problem, start.x)
-        return MethodResult(problem, start.x, value, Status.INFEASIBLE, message)
+        return Answer.at(problem, start.x, Status.INFEASIBLE, message)
     return minimum_within_limits(problem, limits, start, price, criteria)
 
 

@@ -17,12 +17,13 @@ from hovi.optimize.interior_point import minimize_bounded
 from hovi.optimize.start import Start
 from hovi.planning.problem.limits import Limits
 from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.solver.answer import Answer
 from hovi.planning.solver.free_duration.timed_bounded_action import TimedBoundedAction
 from hovi.planning.solver.free_duration.timed_path import TimedPath, TimePrice, stretched_path
 from hovi.planning.solver.methods.bounded_search import Begun, Bounded, BoundedSearch
 from hovi.planning.solver.methods.feasibility import solved_from
 from hovi.planning.solver.methods.limits_between_points import tightened, usable
-from hovi.planning.solver.methods.method import Guess, MethodResult
+from hovi.planning.solver.methods.method import Guess
 from hovi.planning.solver.outcome.cost_with_time import cost_of
 from hovi.planning.solver.status import Status, unfinished
 from hovi.system.dataclass import dataclass
@@ -46,7 +47,7 @@ def minimum_within_limits(
     start: Guess,
     price: TimePrice,
     criteria: Criteria,
-) -> MethodResult:
+) -> Answer:
     """A motion and a duration of least S + w T within limits, from a guess for the problem's."""
     search = TimedSearch(problem, limits, criteria, None, start, price=price)
     try:
@@ -140,7 +141,7 @@ class TimedSearch(BoundedSearch):
         return 0 if model.factor(0.0) is not None else model.negative_eigenvalues()
 
 
-def _searched(search: TimedSearch) -> MethodResult:
+def _searched(search: TimedSearch) -> Answer:
     """A minimum at the points, then one within limits everywhere."""
     ended = _at_the_points(search)
     if ended.why in STOPPED or not usable(ended):
@@ -159,7 +160,7 @@ def _searched(search: TimedSearch) -> MethodResult:
         status, what = Status.SADDLE, f"a saddle of cost {value:.10g} with {curved}"
     instants, forces = search.forces(ended)
     central = search.central_path(ended) if status is Status.MINIMUM else None
-    return MethodResult(
+    return Answer(
         problem,
         x,
         value,
@@ -192,7 +193,7 @@ def _at_the_points(search: TimedSearch) -> Bounded:
     return near if usable(near) or near.why in STOPPED else search.solve(Start(search.guess))
 
 
-def _ended(search: TimedSearch, why: Reason) -> MethodResult:
+def _ended(search: TimedSearch, why: Reason) -> Answer:
     """The motion of the last solve, which is no minimum."""
     problem, path = search.last
     value, steps = cost_of(problem, path), search.iterations
@@ -201,4 +202,4 @@ def _ended(search: TimedSearch, why: Reason) -> MethodResult:
     else:
         status, reason = unfinished(why)
     message = f"{reason} after {steps} steps; the motion is the best so far, of cost {value:.10g}."
-    return MethodResult(problem, path, value, status, message, steps, history=search.history)
+    return Answer(problem, path, value, status, message, steps, history=search.history)

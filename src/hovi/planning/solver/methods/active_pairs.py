@@ -20,14 +20,15 @@ from hovi.planning.clearance.clearance_violation import near_pairs
 from hovi.planning.problem.contradictions import contradiction
 from hovi.planning.problem.limits import no_limits
 from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.solver.answer import Answer
 from hovi.planning.solver.methods.augmented_lagrangian import AugmentedLagrangian
-from hovi.planning.solver.methods.method import Guess, Method, MethodResult, Report
+from hovi.planning.solver.methods.method import Guess, Method, Report
 from hovi.planning.solver.methods.trust_region import TrustRegion
 from hovi.planning.solver.status import Status, unfinished
 from hovi.system.deadline import Deadline, OutOfTimeError
 from hovi.system.interruption import record_interrupt
 
-Solve = Callable[[TrajectoryProblem, Guess, Criteria], MethodResult]
+Solve = Callable[[TrajectoryProblem, Guess, Criteria], Answer]
 Index = npt.NDArray[np.intp]
 
 FIRST_BEYOND = 0.002
@@ -45,7 +46,7 @@ def with_active_pairs(
     start: Guess,
     criteria: Criteria,
     report: Report | None = None,
-) -> MethodResult:
+) -> Answer:
     """The result of solves with growing sets of pairs, until all pairs keep the margin.
 
     solve: of a problem from a guess with criteria. The first set are the pairs that violate or
@@ -63,7 +64,7 @@ def without_pairs(
     start: Guess,
     criteria: Criteria,
     report: Report | None = None,
-) -> MethodResult | None:
+) -> Answer | None:
     """The motion of a problem without limits that keeps its distances of itself; else None.
 
     It is not looked for where a guess does not keep them. Arguments as for `with_active_pairs`.
@@ -87,7 +88,7 @@ class _Rounds:
         self._solve, self._problem, self._start, self._report = solve, problem, start, report
         self._criteria, self._deadline = criteria, Deadline(criteria.time_limit)
 
-    def run(self) -> MethodResult:
+    def run(self) -> Answer:
         """Solve and add pairs until none is too close."""
         path = self._start.x
         try:
@@ -113,7 +114,7 @@ class _Rounds:
             result = self._again(result, chosen, path if free else None)
         return result
 
-    def free(self) -> MethodResult | None:
+    def free(self) -> Answer | None:
         """A solve without any pair; None where one is too close, before or after it."""
         try:
             path = self._start.x
@@ -126,7 +127,7 @@ class _Rounds:
             return None
         return None if close else result
 
-    def _violating(self, result: MethodResult, chosen: Index) -> Index:
+    def _violating(self, result: Answer, chosen: Index) -> Index:
         """If other pairs violate the margin: those, and the pairs that are near."""
         if np.isin(self._too_close(result.problem, result.path), chosen).all():
             return np.zeros(0, dtype=np.intp)
@@ -146,21 +147,15 @@ class _Rounds:
             least = float(problem.clearance.margin) + beyond
             return near_pairs(problem.trajectory(path), problem.distances, least)
 
-    def _again(
-        self, result: MethodResult, chosen: Index, free: DiscretePath | None
-    ) -> MethodResult:
+    def _again(self, result: Answer, chosen: Index, free: DiscretePath | None) -> Answer:
         """A solve with other pairs from the motion of a result, or from a guess that is free."""
         if free is None:
             again = self._solved(result.problem, result.path, chosen)
         else:
             again = self._solved(self._problem, free, chosen)
-        return dataclasses.replace(
-            again, nit=result.nit + again.nit, history=[*result.history, *again.history]
-        )
+        return again.after(result)
 
-    def _solved(
-        self, problem: TrajectoryProblem, path: DiscretePath, chosen: Index
-    ) -> MethodResult:
+    def _solved(self, problem: TrajectoryProblem, path: DiscretePath, chosen: Index) -> Answer:
         """A solve with some pairs; its problem has all of them again."""
         whole = problem.clearance
         assert whole is not None
@@ -182,7 +177,7 @@ def with_clearance(problem: TrajectoryProblem, clearance: Clearance) -> Trajecto
     return other
 
 
-def _unfinished(result: MethodResult, why: Reason) -> MethodResult:
+def _unfinished(result: Answer, why: Reason) -> Answer:
     """A result whose distances were not checked to the end."""
     status, reason = unfinished(why)
     message = (

@@ -14,6 +14,7 @@ from hovi.optimize.start import Start
 from hovi.optimize.trust_region import minimize
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.action_objective import ActionObjective
+from hovi.planning.solver.answer import Answer
 from hovi.planning.solver.augmented_lagrangian_rounds import (
     NODE_TOLERANCE,
     TORQUE_TOLERANCE,
@@ -22,7 +23,7 @@ from hovi.planning.solver.augmented_lagrangian_rounds import (
     unmet_sentence,
     within,
 )
-from hovi.planning.solver.methods.method import Guess, Method, MethodResult, Report
+from hovi.planning.solver.methods.method import Guess, Method, Report
 from hovi.planning.solver.methods.trust_region import negative_eigenvalues
 from hovi.planning.solver.multipliers import Multipliers
 from hovi.planning.solver.outcome.cost_with_time import cost_of
@@ -48,11 +49,11 @@ class AugmentedLagrangian(Method):
         start: Guess,
         criteria: Criteria,
         report: Report | None = None,
-    ) -> MethodResult:
+    ) -> Answer:
         """See Method.minimize."""
         if problem.unreachable:
-            value, message = cost_of(problem, start.x), f"{problem.unreachable}."
-            return MethodResult(problem, start.x, value, Status.INFEASIBLE, message)
+            said = f"{problem.unreachable}."
+            return Answer.at(problem, start.x, Status.INFEASIBLE, said)
         ended, known, reason, history = _rounds(problem, start.x, criteria, report)
         objective = ActionObjective(problem, multipliers=known)
         n_neg = negative_eigenvalues(objective, ended)
@@ -61,7 +62,7 @@ class AugmentedLagrangian(Method):
         polish = POLISHING_STEPS if status is Status.MINIMUM else 0
         x, known = _polished(problem, ended.x, known, polish)
         value = cost_of(problem, x)
-        return MethodResult(problem, x, value, status, message, nit, n_neg, history, known.forces)
+        return Answer(problem, x, value, status, message, nit, n_neg, history, known.forces)
 
 
 def _rounds(

@@ -89,7 +89,7 @@ class BoundedSearch:
         whether a solve begins on one. timed: whether the duration is free.
     along, level: central path of a similar problem, if there is one on as many intervals, and the
         barrier parameter at which it is begun: see Start.
-    locally_infeasible: see MethodResult.
+    locally_infeasible: see Answer.
     """
 
     timed: ClassVar[bool] = False

@@ -14,11 +14,12 @@ from hovi.optimize.ended import STOPPED, Reason
 from hovi.planning.problem.contradictions import contradiction
 from hovi.planning.problem.limits import no_limits
 from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.solver.answer import Answer
 from hovi.planning.solver.methods.active_pairs import with_active_pairs, without_pairs
 from hovi.planning.solver.methods.bounded_search import BoundedSearch
 from hovi.planning.solver.methods.feasibility import feasible_motion
 from hovi.planning.solver.methods.limits_between_points import tightened, usable
-from hovi.planning.solver.methods.method import Guess, Method, MethodResult, Report
+from hovi.planning.solver.methods.method import Guess, Method, Report
 from hovi.planning.solver.methods.torque_rates_last import with_torque_rates_last
 from hovi.planning.solver.non_finite import non_finite_sentence
 from hovi.planning.solver.outcome.cost_with_time import cost_of
@@ -68,7 +69,7 @@ class InteriorPoint(Method):
         start: Guess,
         criteria: Criteria,
         report: Report | None = None,
-    ) -> MethodResult:
+    ) -> Answer:
         """See Method.minimize; intervals may be split."""
         solve = partial(self._solved, report=report)
         return with_torque_rates_last(solve, problem, start, criteria)
@@ -79,7 +80,7 @@ class InteriorPoint(Method):
         start: Guess,
         criteria: Criteria,
         report: Report | None,
-    ) -> MethodResult:
+    ) -> Answer:
         """With rows for distances where pairs come near; in rounds where that is not supported."""
         rounds = partial(with_active_pairs, partial(self._minimize, report=report), report=report)
         if not takes_rows(problem):
@@ -100,9 +101,7 @@ class InteriorPoint(Method):
         if self.distances == "rows" or found.status not in WITHOUT_MOTION:
             return found
         at_points = dataclasses.replace(at_points, time_limit=deadline.seconds_left)
-        again = rounds(problem, start, at_points)
-        history = [*found.history, *again.history]
-        return dataclasses.replace(again, nit=found.nit + again.nit, history=history)
+        return rounds(problem, start, at_points).after(found)
 
     def _minimize(
         self,
@@ -111,12 +110,12 @@ class InteriorPoint(Method):
         criteria: Criteria,
         report: Report | None,
         lazy: bool = False,
-    ) -> MethodResult:
+    ) -> Answer:
         limits = problem.limits or no_limits(problem.coordinates)
         reason = contradiction(problem, limits)
         if reason:
-            value, message = cost_of(problem, start.x), infeasible_sentence(reason)
-            return MethodResult(problem, start.x, value, Status.INFEASIBLE, message)
+            said = infeasible_sentence(reason)
+            return Answer.at(problem, start.x, Status.INFEASIBLE, said)
         search = BoundedSearch(problem, limits, criteria, report, start, lazy=lazy)
         try:
             return _searched(search)
@@ -127,7 +126,7 @@ class InteriorPoint(Method):
             return _ended(search, Reason.TIME_LIMIT)
 
 
-def _searched(search: BoundedSearch) -> MethodResult:
+def _searched(search: BoundedSearch) -> Answer:
     """Run all stages."""
     ended, reason = feasible_motion(search)
     reason, excess = reason or search.unmet, 0.0
@@ -155,17 +154,17 @@ def _searched(search: BoundedSearch) -> MethodResult:
     history, central = search.history, None
     if status is Status.MINIMUM:
         central = search.central_path(ended)
-    result = MethodResult(problem, x, value, status, message, nit, n_neg, history, forces, instants)
+    result = Answer(problem, x, value, status, message, nit, n_neg, history, forces, instants)
     locally = status is Status.INFEASIBLE and search.locally_infeasible
     return dataclasses.replace(result, central=central, locally_infeasible=locally)
 
 
-def _ended(search: BoundedSearch, why: Reason) -> MethodResult:
+def _ended(search: BoundedSearch, why: Reason) -> Answer:
     """The motion of the last solve."""
     problem, path = search.last
     value, nit = cost_of(problem, path), search.iterations
     status, message = _unfinished(why, nit, value)
-    return MethodResult(problem, path, value, status, message, nit, history=search.history)
+    return Answer(problem, path, value, status, message, nit, history=search.history)
 
 
 def _non_finite(search: BoundedSearch, path: DiscretePath, cost: float, excess: float) -> str:

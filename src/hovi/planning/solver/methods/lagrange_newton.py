@@ -16,6 +16,7 @@ from hovi.optimize.start import Start
 from hovi.optimize.trust_region import minimize
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.action_objective import ActionObjective
+from hovi.planning.solver.answer import Answer
 from hovi.planning.solver.augmented_lagrangian_rounds import (
     FEASIBLE_RESIDUAL,
     FIRST_DECREASE,
@@ -31,7 +32,7 @@ from hovi.planning.solver.methods.augmented_lagrangian import (
     constrained_status,
     with_offset,
 )
-from hovi.planning.solver.methods.method import Guess, Method, MethodResult, Report
+from hovi.planning.solver.methods.method import Guess, Method, Report
 from hovi.planning.solver.outcome.cost_with_time import price_of_time
 from hovi.system.dataclass import dataclass
 from hovi.system.deadline import Deadline, OutOfTimeError
@@ -62,7 +63,7 @@ class LagrangeNewton(Method):
         start: Guess,
         criteria: Criteria,
         report: Report | None = None,
-    ) -> MethodResult:
+    ) -> Answer:
         """See Method.minimize."""
         rounds = AugmentedLagrangian()
         if problem.unreachable:
@@ -100,7 +101,7 @@ class _Search:
         """The report, with step numbers that continue."""
         return with_offset(self.on_step, len(self.history))
 
-    def run(self, path: DiscretePath, near: bool) -> MethodResult | None:
+    def run(self, path: DiscretePath, near: bool) -> Answer | None:
         """The result; None where the method fails. near: whether the path is near a solution."""
         problem = self.problem
         multipliers = None
@@ -161,7 +162,7 @@ class _Search:
 
     def _result(
         self, objective: ConstrainedAction, found: Ended[DiscretePath, Array], n_neg: int
-    ) -> MethodResult:
+    ) -> Answer:
         """The result of a solve, whether it ended in a minimum or not."""
         problem, x, nit = self.problem, found.x, len(self.history)
         known = objective.multipliers(found.z)
@@ -174,7 +175,7 @@ class _Search:
             reason = unmet_sentence(problem, x, residuals)
         status, message = constrained_status(problem, found, reason, cost, nit, n_neg)
         forces, jets = known.forces, objective.action.jets(x)
-        return MethodResult(
+        return Answer(
             problem, x, cost, status, message, nit, n_neg, self.history, forces, jets=jets
         )
 

@@ -13,7 +13,8 @@ from hovi.optimize.criteria import Criteria
 from hovi.optimize.ended import Reason
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.action_objective import ActionObjective
-from hovi.planning.solver.methods.method import Guess, Method, MethodResult, Report
+from hovi.planning.solver.answer import Answer
+from hovi.planning.solver.methods.method import Guess, Method, Report
 from hovi.planning.solver.outcome.cost_with_time import cost_of
 from hovi.planning.solver.status import Status, chart_sentence, unfinished
 from hovi.system.deadline import Deadline, OutOfTimeError, raise_if_late
@@ -54,7 +55,7 @@ class Stationary(Method):
         start: Guess,
         criteria: Criteria,
         report: Report | None = None,
-    ) -> MethodResult:
+    ) -> Answer:
         """See Method.minimize; what is made small is the gradient."""
         search = _Search(ActionObjective(problem, "band"), start.x)
         with Deadline(criteria.time_limit).in_force():
@@ -73,7 +74,7 @@ class Stationary(Method):
                 f"{reason} after {search.steps} steps, before a stationary point was found; try a "
                 "guess nearer to one."
             )
-        return MethodResult(problem, x, value, status, message, search.steps, n_neg)
+        return Answer(problem, x, value, status, message, search.steps, n_neg)
 
 
 class _Search:

@@ -16,13 +16,14 @@ from hovi.optimize.criteria import Criteria
 from hovi.planning.problem.limit_violation import closeness
 from hovi.planning.problem.limits import KINDS, Limits
 from hovi.planning.problem.problem import TrajectoryProblem
-from hovi.planning.solver.methods.method import Guess, MethodResult
+from hovi.planning.solver.answer import Answer
+from hovi.planning.solver.methods.method import Guess
 from hovi.planning.solver.status import Status
 from hovi.scene.jerk_lagrangian import JerkLagrangian
 from hovi.scene.lagrangian import PointTerms
 from hovi.system.deadline import Deadline
 
-Solve = Callable[[TrajectoryProblem, Guess, Criteria], MethodResult]
+Solve = Callable[[TrajectoryProblem, Guess, Criteria], Answer]
 TORQUE_RATE = "torque_rate"
 NEAR_A_RATE = 0.02
 """Distance of a guess from the limits on the torque rate, as a share of their range, below which
@@ -31,7 +32,7 @@ they are imposed at once where the guess is the motion of a similar problem."""
 
 def with_torque_rates_last(
     solve: Solve, problem: TrajectoryProblem, start: Guess, criteria: Criteria
-) -> MethodResult:
+) -> Answer:
     """The result of a solve without limits on the torque rate; with them if the motion needs them.
 
     solve: of a problem from a guess with criteria. The second solve begins at the first one's
@@ -53,10 +54,7 @@ def with_torque_rates_last(
     full = problem.on(first.problem.grid)
     if first.status is Status.MINIMUM and _margin(full, limits, first.path) < -limits.tolerance:
         left = dataclasses.replace(criteria, time_limit=deadline.seconds_left)
-        second = solve(full, dataclasses.replace(start, x=first.path, near=True), left)
-        return dataclasses.replace(
-            second, nit=first.nit + second.nit, history=[*first.history, *second.history]
-        )
+        return solve(full, dataclasses.replace(start, x=first.path, near=True), left).after(first)
     forces = None if first.forces is None else [_with_rates(terms) for terms in first.forces]
     return dataclasses.replace(first, problem=full, forces=forces)
 

@@ -13,7 +13,8 @@ from hovi.optimize.start import Start
 from hovi.optimize.trust_region import minimize
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.action_objective import ActionObjective
-from hovi.planning.solver.methods.method import Guess, Method, MethodResult, Report
+from hovi.planning.solver.answer import Answer
+from hovi.planning.solver.methods.method import Guess, Method, Report
 from hovi.planning.solver.outcome.cost_with_time import price_of_time
 from hovi.planning.solver.status import chart_sentence, status_of
 from hovi.system.deadline import OutOfTimeError
@@ -32,7 +33,7 @@ class TrustRegion(Method):
         start: Guess,
         criteria: Criteria,
         report: Report | None = None,
-    ) -> MethodResult:
+    ) -> Answer:
         """See Method.minimize."""
         objective = ActionObjective(problem)
         exact = dataclasses.replace(criteria, exact=True)
@@ -40,7 +41,7 @@ class TrustRegion(Method):
         n_neg = 0 if ended.convex else negative_eigenvalues(objective, ended)
         cost, nit = ended.value + price_of_time(problem), len(ended.steps)
         status, message = status_of(problem, ended, cost, nit, n_neg)
-        return MethodResult(
+        return Answer(
             problem,
             ended.x,
             cost,

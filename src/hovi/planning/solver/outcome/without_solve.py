@@ -6,8 +6,8 @@ from hovi.discrete.grid import DiscretePath
 from hovi.discrete.trajectory import Trajectory
 from hovi.planning.problem.presolve.swings import too_many_swings
 from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.solver.answer import Answer
 from hovi.planning.solver.initial_path import guess_path
-from hovi.planning.solver.methods.method import MethodResult
 from hovi.planning.solver.outcome.cost_with_time import cost_of
 from hovi.planning.solver.solver import Solution, solution_of
 from hovi.planning.solver.status import Status, infeasible_sentence
@@ -30,8 +30,8 @@ def minimum_at(
     """
     value = cost_of(problem, path)
     message = f"a minimum of cost {value:.10g} after {steps} steps."
-    result = MethodResult(problem, path, value, Status.MINIMUM, message, steps, n_neg=0)
-    return solution_of(result, 0.0, seconds)
+    result = Answer(problem, path, value, Status.MINIMUM, message, steps, n_neg=0)
+    return solution_of(result, solve_seconds=seconds)
 
 
 def unresolved_at_once(
@@ -43,8 +43,7 @@ def unresolved_at_once(
     """The guess of a problem that a grid is not likely to resolve. reason, advice: as clauses."""
     path = guess_path(problem, guess)
     message = f"no motion was sought, since a grid is not likely to resolve it: {reason}; {advice}."
-    value = cost_of(problem, path)
-    return solution_of(MethodResult(problem, path, value, Status.UNRESOLVED, message), 0.0, 0.0)
+    return solution_of(Answer.at(problem, path, Status.UNRESOLVED, message))
 
 
 def infeasible_at_once(
@@ -52,8 +51,7 @@ def infeasible_at_once(
 ) -> Solution:
     """The guess of a problem that is known to have no motion. reason: as a clause."""
     path, message = guess_path(problem, guess), infeasible_sentence(reason)
-    value = cost_of(problem, path)
-    return solution_of(MethodResult(problem, path, value, Status.INFEASIBLE, message), 0.0, 0.0)
+    return solution_of(Answer.at(problem, path, Status.INFEASIBLE, message))
 
 
 def without_search(

@@ -21,27 +21,19 @@ from hovi.discrete.guess import Curve
 from hovi.discrete.state import State
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.receding.last_motion import meets
-from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 
 BRAKES = "Instead, this motion brakes to rest from the start, within the limits."
-"""What is told of such a motion."""
+"""What is reported of such a motion."""
 FIRST, TIMES = 0.02, 7
 """First time t_s, as a share of the motion, and the number of times, each twice the one before."""
 
 
-@dataclass(frozen=True, eq=False)
-class Braking:
-    """A problem whose goal is where a robot comes to rest, and a motion within its limits."""
-
-    problem: TrajectoryProblem
-    path: DiscretePath
-
-
-def braking(problem: TrajectoryProblem) -> Braking | None:
+def braking(problem: TrajectoryProblem) -> tuple[TrajectoryProblem, DiscretePath] | None:
     """A motion to rest from the start of a problem, in its duration; None if none is found.
 
+    With the problem whose goal is where the robot comes to rest.
     Raises OutOfTimeError when the deadline in force passes before that is known.
     """
     space, k = problem.coordinates.curved_space, problem.ld.k
@@ -57,14 +49,16 @@ def braking(problem: TrajectoryProblem) -> Braking | None:
     return None
 
 
-def _within(problem: TrajectoryProblem, time: float) -> Braking | None:
+def _within(
+    problem: TrajectoryProblem, time: float
+) -> tuple[TrajectoryProblem, DiscretePath] | None:
     """The motion that rests from a time on, in [s]; None if it exceeds a limit."""
     curve = _to_rest(problem, time)
     stop = State(curve(np.array([time]))[0][0])
     ld = DiscreteLagrangian(problem.ld.lagrangian, problem.grid)
     stopping = dataclasses.replace(problem, ld=ld, goal=stop, via=())
     path = stopping.path(curve)
-    return Braking(stopping, path) if meets(stopping, path) else None
+    return (stopping, path) if meets(stopping, path) else None
 
 
 def _to_rest(problem: TrajectoryProblem, time: float) -> Curve:

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING
 
 from hovi.discrete.grid import DiscretePath
 from hovi.planning.problem.problem import TrajectoryProblem
-from hovi.planning.solver.methods.method import MethodResult
-from hovi.planning.solver.outcome.cost_with_time import cost_of
+from hovi.planning.solver.answer import Answer
 from hovi.planning.solver.requirements.ends import misses
 from hovi.planning.solver.requirements.requirements_of import requirements_between_ends
 from hovi.planning.solver.status import Status
@@ -35,7 +34,7 @@ def last_motion(
     central: CentralPath | None,
     steps: int,
     name: str,
-) -> MethodResult:
+) -> Answer:
     """A motion of a similar problem as the result, where time ran out.
 
     path: on the problem's grid, perhaps with other ends. central: for the next solve.
@@ -43,8 +42,7 @@ def last_motion(
     """
     missed = misses(problem, path) or "meets the ends; its limits were not checked"
     message = f"{out_of_time(steps)}; {name}, which {missed}."
-    cost, status = cost_of(problem, path), Status.TIME_LIMIT
-    return MethodResult(problem, path, cost, status, message, steps, central=central)
+    return Answer.at(problem, path, Status.TIME_LIMIT, message, steps, central)
 
 
 def out_of_time(steps: int) -> str:
