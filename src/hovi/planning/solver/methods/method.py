@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 from hovi.discrete.grid import DiscretePath
 from hovi.optimize.criteria import Criteria
@@ -13,12 +13,9 @@ from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.answer import Answer
 
 if TYPE_CHECKING:
-    pass
+    from hovi.planning.solver.central_path import CentralPath
 
-if TYPE_CHECKING:
-    pass
-
-Guess = Start[DiscretePath, "CentralPath"]
+Guess: TypeAlias = "Start[DiscretePath, CentralPath]"
 """A motion on the grid of a problem, with the central path of a similar one if it is known."""
 Report = Callable[[int, float], None]
 """Called with the number of each step and the least cost so far."""
