@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import field
+from typing import Any
 
 from hovi.discrete.trajectory import Trajectory
 from hovi.planning.clearance.clearance import Clearance
@@ -11,7 +12,9 @@ from hovi.planning.clearance.distances import Distances
 from hovi.planning.problem.limits import Limits
 from hovi.planning.solver.requirements import distances
 from hovi.planning.solver.requirements import limit_margins as limited
+from hovi.planning.solver.requirements.distances import Apart
 from hovi.planning.solver.requirements.limit_margins import LimitMargins
+from hovi.planning.solver.requirements.requirements_of import requirements_between_ends
 from hovi.planning.solver.solver import Solution
 from hovi.planning.solver.status import Status
 from hovi.system.dataclass import dataclass
@@ -34,8 +37,8 @@ def nearest_pair(motion: Solution | Trajectory) -> tuple[float | None, str | Non
 class KnownMargins:
     """What a report shows of the margins of a motion, and whether the motion is usable.
 
-    limits, distance, segments, nearest_pair: as hovi.Margins; None, or none, without limits or
-        obstacles.
+    limits, distance, segments, nearest_pair, conditions: as hovi.Margins; None, or none, where
+        there are none.
     violation: as Solution.violation; None if it is not known.
     missing: why the rest is not known; "" if all is.
     """
@@ -46,6 +49,7 @@ class KnownMargins:
     violation: str | None = None
     missing: str = ""
     nearest_pair: str | None = None
+    conditions: Mapping[str, float] = field(default_factory=dict)
 
     @classmethod
     def of(cls, solution: Solution, deadline: Deadline) -> KnownMargins:
@@ -55,16 +59,19 @@ class KnownMargins:
         """
         if is_guess(solution):
             return cls(missing="there is no motion, only a guess")
-        limits, segments, violation = None, dict[str, LimitMargins](), None
+        motion, problem = solution.trajectory, solution.problem
+        asked = [] if problem is None else [*requirements_between_ends(problem)]
+        known, violation = dict[str, Any](), None
         try:
             with deadline.in_force():
-                motion = solution.trajectory
-                limits, segments = limited.limit_margins(motion, _limits_of(solution))
-                violation = solution.violation if solution.problem is not None else None
-                distance, pair = nearest_pair(solution)
-                return cls(limits, distance, segments, violation, nearest_pair=pair)
+                for each in asked:
+                    known |= {} if isinstance(each, Apart) else each.margins(motion)
+                violation = None if problem is None else solution.violation
+                for each in asked:
+                    known |= each.margins(motion) if isinstance(each, Apart) else {}
+                return cls(**known, violation=violation)
         except OutOfTimeError as late:
-            return cls(limits, None, segments, violation, str(late))
+            return cls(**known, violation=violation, missing=str(late))
 
 
 def is_guess(solution: Solution) -> bool:

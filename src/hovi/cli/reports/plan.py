@@ -66,6 +66,7 @@ def as_json(
         "violation": margins.violation or None,
         "least_distance": margins.distance,
         "nearest_pair": margins.nearest_pair,
+        "conditions": dict(margins.conditions),
         "out": None if out is None else str(out),
         **segments_json(solution, margins.segments),
         **accuracy_json(solution, task),
@@ -101,6 +102,8 @@ def print_report(
     _print_lines(extremes_lines(extremes(solution.trajectory), verbose))
     if margins.missing:
         print(f"margins  none: {margins.missing}")
+    for name, margin in margins.conditions.items():
+        print(f"{name:8} condition with a margin of {100 * margin:.3g} % of its scale")
     if margins.distance is not None:
         kept = task.options.clearance.margin
         print(

@@ -15,6 +15,8 @@ from hovi.planning.conditions.places import AtNode, AtTimes
 from hovi.planning.conditions.sets import Between
 from hovi.robot.space.coordinates import Coordinates
 
+NODE_TOLERANCE = 1e-9
+"""Distance of a node from a time, relative to the duration, at which it counts as there."""
 Given = Sequence[Condition[Any, Any]]
 
 
@@ -40,9 +42,15 @@ def asked_at_nodes(given: Given, grid: Grid) -> tuple[Equation, ...]:
     found = []
     for each in given:
         for time in times_of([each]):
-            node = grid.node_at(time)
-            place = AtNode(node, float(grid.t[node]))
-            found.append(dataclasses.replace(each, where=place))
+            node = int(np.argmin(np.abs(grid.t - time)))
+            nearest = float(grid.t[node])
+            if abs(nearest - time) > NODE_TOLERANCE * grid.duration:
+                raise InputError(
+                    f"condition {each.name!r} is asked at {time:g} s, where the grid needs a node, "
+                    f"and the nearest is at {nearest:g} s of {grid.duration:g} s: choose a time "
+                    "within the motion, or move a node there by `grid.with_nodes`."
+                )
+            found.append(dataclasses.replace(each, where=AtNode(node, nearest)))
     return tuple(found)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any, Generic, TypeVar
 
@@ -40,7 +41,7 @@ class Condition(Generic[Values, Place]):
         and t; or a Function.
     on: hovi.Between(lower, upper) or hovi.Equal(value).
     where: hovi.AtTimes(times) for a value; left out for bounds.
-    name: in messages. unit: of y, in messages.
+    name: in messages. unit: of y, in messages. of: names of its entries there, such as joints.
     scale: of y, one number or one for each entry: by default the range between its bounds, or the
         size of the only one. Bounds that are functions of time need it.
     tolerance: share of the scale by which a bound may be exceeded anywhere.
@@ -54,6 +55,7 @@ class Condition(Generic[Values, Place]):
     unit: str = ""
     scale: npt.ArrayLike | None = None
     tolerance: float = TOLERANCE
+    of: Sequence[str] = ()
 
     def __post_init__(self) -> None:
         if not (isinstance(self.function, str | Function) or callable(self.function)):
@@ -133,6 +135,11 @@ def bound(
             )
     if given.scale is not None:
         _require_size("scale", given, np.asarray(given.scale), y.size)
+    if len(given.of) not in (0, y.size):
+        raise InputError(
+            f"condition {given.name!r} needs {y.size} names in `of`, one for each value of its "
+            f"function, got {len(given.of)}."
+        )
     return dataclasses.replace(given, function=y)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Collection, Mapping, Sequence
 from functools import cached_property
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +14,8 @@ from hovi.checks.arguments import check_arguments, check_arguments_except
 from hovi.checks.kinds import shown
 from hovi.checks.shapes import require_shape
 from hovi.errors import InputError, nearest, warn
+from hovi.planning.conditions.condition import Bounded, bound
+from hovi.planning.conditions.named import NAMED
 from hovi.planning.problem.arms.limit_set import KIND_NAMES, OF_ORDER_3, is_limit_set, limit_set
 from hovi.planning.problem.arms.limit_set import NAMES as ARMS
 from hovi.planning.problem.arms.urdf_ranges import position_ranges, require_ranges
@@ -57,6 +59,7 @@ class Limits(LimitsSummary):
     strict: whether a start outside its limits, or that cannot but leave them, is refused.
     window: least share of the motion in which it is led back otherwise.
     excused: of a motion, what its start exceeds until when; `TrajectoryProblem` sets it.
+    conditions: bounds of other quantities, such as the power, which `as_limits` makes.
     Raises InputError for NaN and for a range that is empty to rounding.
     """
 
@@ -68,6 +71,7 @@ class Limits(LimitsSummary):
     strict: bool = False
     window: float = WINDOW
     excused: tuple[Excused, ...] = ()
+    conditions: tuple[Bounded, ...] = ()
 
     def __post_init__(self) -> None:
         few = self.lower.shape[:1] == (FIRST_KINDS,)
@@ -101,6 +105,12 @@ class Limits(LimitsSummary):
             parts = [_with_all_kinds(each) for each in parts]
         for each in parts:
             require_shape("the limits of a segment", each.lower, *parts[0].lower.shape)
+            if each.conditions != parts[0].conditions:
+                words = " and ".join(sorted({x.name for p in parts for x in p.conditions}))
+                raise InputError(
+                    f"limits on the {words} must be those of all segments: give them for the whole "
+                    "motion."
+                )
         lower = np.stack([each.lower for each in parts])
         upper = np.stack([each.upper for each in parts])
         low = np.min(np.where(np.isfinite(lower), lower, np.inf), axis=0)
@@ -108,7 +118,8 @@ class Limits(LimitsSummary):
         high[np.isinf(high)] = np.inf
         low[np.isinf(low) | (low >= high)] = -np.inf  # one-sided bounds of different segments
         tolerance, strict = min(each.tolerance for each in parts), any(x.strict for x in parts)
-        return cls(low, high, tolerance, tuple(parts), tuple(ends), strict, parts[0].window)
+        known = parts[0].window, (), parts[0].conditions
+        return cls(low, high, tolerance, tuple(parts), tuple(ends), strict, *known)
 
     def on(self, nodes: Array) -> Range:
         """Lower and upper bounds in each interval, (N or 1, kinds, nv): 1 without segments.
@@ -310,9 +321,9 @@ def as_limits(
     limits: "urdf" (of a robot), "soft" (the same, with the soft limits of its safety controllers),
         "none", the name of an arm of `hovi.limit_sets`, a Limits, or a mapping with any of `base`
         (one of these names, "urdf" by default), `q`, `v`, `a`, `tau`, `jerk`, `torque_rate`,
-        `margin` and `tolerance`. A kind is a number x for -x and x, a text such as "50 %" for that
-        share of the base's limits (not of positions), a list of these or of pairs (lower, upper),
-        or a mapping from joint names to any of them.
+        `power` (of tau v, in [W]), `margin` and `tolerance`. A kind is a number x for -x and x, a
+        text such as "50 %" for that share of the base's limits (not of positions or the power), a
+        list of these or of pairs (lower, upper), or a mapping from joint names to any of them.
     order: of the motion. What an arm's set says of jerk and torque rate applies from order 3 on.
     Raises InputError for unknown keys or joints and for bounds that do not fit the coordinates.
     Warns of ranges of angles that look like degrees.
@@ -326,7 +337,7 @@ def as_limits(
         )
     if not isinstance(limits, Mapping):
         return _warned_of_degrees(coordinates, _by_name(coordinates, limits, order, ()))
-    keys = ("base", *KINDS, "margin", "tolerance")
+    keys = ("base", *KINDS, *NAMED, "margin", "tolerance")
     for key in limits:
         if key not in keys:
             raise InputError(f"unknown key `limits.{key}`; {nearest(str(key), keys)}")
@@ -340,8 +351,25 @@ def as_limits(
         for i, pair in entries(coordinates, kind, limits.get(kind, {}), of).items():
             lower[row, i], upper[row, i] = pair
     lower[lower < -UNBOUNDED], upper[upper > UNBOUNDED] = -np.inf, np.inf
-    chosen = Limits(lower, upper, number_in(limits, "tolerance", TOLERANCE))
-    return _warned_of_degrees(coordinates, chosen.with_margin(number_in(limits, "margin", 0.0)))
+    margin, tolerance = number_in(limits, "margin", 0.0), number_in(limits, "tolerance", TOLERANCE)
+    chosen = Limits(lower, upper, tolerance).with_margin(margin)
+    named = _named_conditions(coordinates, limits, margin, tolerance)
+    return _warned_of_degrees(coordinates, dataclasses.replace(chosen, conditions=named))
+
+
+def _named_conditions(
+    coordinates: Coordinates, limits: Mapping[str, Any], margin: float, tolerance: float
+) -> tuple[Bounded, ...]:
+    """The conditions that have a key in a mapping. Raises InputError as `entries`."""
+    found = []
+    for name, make in NAMED.items():
+        given = entries(coordinates, name, limits.get(name, {}))
+        if given:
+            kept = {i: margin * (high - low) for i, (low, high) in given.items()}
+            inside = {i: (low + kept[i], high - kept[i]) for i, (low, high) in given.items()}
+            condition = dataclasses.replace(make(coordinates, inside), tolerance=tolerance)
+            found.append(cast(Bounded, bound(condition, coordinates)))
+    return tuple(found)
 
 
 def _warned_of_degrees(coordinates: Coordinates, limits: Limits) -> Limits:

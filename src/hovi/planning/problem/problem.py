@@ -344,8 +344,9 @@ class TrajectoryProblem(ProblemSummary):
 
     @property
     def bounds(self) -> tuple[Bounded, ...]:
-        """The conditions that hold at all times."""
-        return bounded_of(self.conditions)
+        """The conditions that hold at all times, those of the limits included."""
+        of_limits = () if self.limits is None else self.limits.conditions
+        return (*bounded_of(self.conditions), *of_limits)
 
     @property
     def has_limits(self) -> bool:

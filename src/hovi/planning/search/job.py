@@ -236,8 +236,9 @@ def grid_of(T: float, options: PlanOptions, scene: Scene, free: bool) -> Grid:
     elif isinstance(guess, Trajectory) and _is_first_grid(guess.grid, options, scene.order):
         grid = guess.grid.stretched(T)
     else:
-        limited = as_limits(scene.robot, options.limits).bounded.any()
-        kinks = limited or options.clearance.wanted or options.via or options.conditions
+        limits = as_limits(scene.robot, options.limits)
+        limited = limits.bounded.any() or limits.conditions or options.conditions
+        kinks = limited or options.clearance.wanted or options.via
         few = options.starts == 1 and not free and not isinstance(guess, Trajectory)
         number, order = options.interval_count, scene.order
         grid = first_grid(T, number, not kinks, more_points=not few, order=order)

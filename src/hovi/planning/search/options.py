@@ -284,7 +284,7 @@ class PlanOptions:
         if self.conditions:
             return True
         if isinstance(self.limits, Limits):
-            return bool(self.limits.bounded.any())
+            return bool(self.limits.bounded.any() or self.limits.conditions)
         return self.limits != "none"
 
     @property

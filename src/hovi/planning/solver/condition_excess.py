@@ -70,5 +70,6 @@ class ConditionBounds(SampledBounds):
 
 def in_words(given: Bounded, entry: int) -> str:
     """A condition and the entry of its function, in a sentence."""
-    whose = f" of entry {entry}" if given.y.size > 1 else ""
-    return f"condition {given.name!r}{whose}"
+    if given.of:
+        return f"condition {given.name!r} of {given.of[entry]!r}"
+    return f"condition {given.name!r}" + (f" of entry {entry}" if given.y.size > 1 else "")

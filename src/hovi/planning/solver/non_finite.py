@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.discrete.grid import DiscretePath
+from hovi.planning.conditions.function import Points
 from hovi.planning.problem.problem import TrajectoryProblem
 
 Array = npt.NDArray[np.float64]
@@ -17,10 +18,27 @@ def non_finite_sentence(problem: TrajectoryProblem, path: DiscretePath) -> str:
     """The first number that is infinite or NaN, as a clause; "" if all are finite.
 
     Checked in this order: the nodes; accelerations, torques and costs at the quadrature points;
-    the derivatives of the cost.
+    the derivatives of the cost; conditions.
     """
     with np.errstate(all="ignore"):
-        return _at_nodes(problem, path) or _at_points(problem, path) or _derivative(problem, path)
+        return (
+            _at_nodes(problem, path)
+            or _at_points(problem, path)
+            or _derivative(problem, path)
+            or non_finite_condition(problem, path)
+        )
+
+
+def non_finite_condition(problem: TrajectoryProblem, path: DiscretePath) -> str:
+    """The first condition at all times that has no finite value at a point; "" if all have."""
+    ld = problem.ld
+    for lagrangian, jet, t in zip(ld.lagrangians, ld.jets(path), ld.point_times, strict=True):
+        at = Points(jet[0], jet[1], t, jet[2], lagrangian.output(*jet, t=t)[:, : ld.lagrangian.nv])
+        for each in problem.bounds:
+            index = _first_non_finite(each.y.values(at))
+            if index is not None:
+                return f"condition {each.name!r} has no finite value at t = {t[index[0]]:.4g} s"
+    return ""
 
 
 def _at_nodes(problem: TrajectoryProblem, path: DiscretePath) -> str:

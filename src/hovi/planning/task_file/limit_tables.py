@@ -9,6 +9,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from hovi.errors import InputError, nearest
+from hovi.planning.conditions.named import NAMED
 from hovi.planning.problem.limits import KINDS, NAMES, Limits, as_limits
 from hovi.planning.task_file.effect_tables import plain
 from hovi.planning.task_file.messages import Keys, TomlText, first_sentence, in_toml, spelled
@@ -33,7 +34,7 @@ def read_limits(
     except ValidationError as invalid:
         raise first_sentence(invalid, LimitsTable, toml, above=keys) from None
     limits = {key: _by_joint(value, robot) for key, value in given.items()}
-    for kind in KINDS:
+    for kind in (*KINDS, *NAMED):
         _check_kind(keys, kind, limits, robot, toml)
     _check(keys, limits, robot, toml)
     return limits
@@ -80,7 +81,7 @@ def _alone(limits: Mapping[str, Any], kind: str, given: Any) -> dict[str, Any]:
     """A table with one kind of limits; shares also need the base, and the ranges it may lack."""
     parts = list(given.values()) if isinstance(given, dict) else given
     parts = parts if isinstance(parts, list) else [parts]
-    if kind == "q" or not any(isinstance(each, str) for each in parts):
+    if kind in ("q", *NAMED) or not any(isinstance(each, str) for each in parts):
         return {"base": "none", kind: given}
     return {key: limits[key] for key in ("base", "q") if key in limits} | {kind: given}
 

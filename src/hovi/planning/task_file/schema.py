@@ -236,6 +236,7 @@ class LimitsTable(Table):
     tau: Bounds | None = Field(default=None, description=_BOUNDS)
     jerk: Bounds | None = Field(default=None, description=_BOUNDS)
     torque_rate: Bounds | None = Field(default=None, description=_BOUNDS)
+    power: PositionBounds | None = Field(default=None, description=_POSITION_BOUNDS)
     margin: FiniteFloat = Field(
         default=0.0, ge=0, lt=0.5, description="a share of the range, from 0 to below 0.5"
     )

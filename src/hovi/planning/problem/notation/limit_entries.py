@@ -80,9 +80,10 @@ def _bounds(
     if not isinstance(value, str):
         return _pair(kind, name, value)
     if kind == "q" or base is None:
+        what = "a range of positions" if kind == "q" else f"the {kind}"
         raise InputError(
-            f"limits.{kind} of {name!r} is {value!r}, and a range of positions has no share: give "
-            "a pair lower < upper, or a `margin`, which keeps clear of both ends of all ranges."
+            f"limits.{kind} of {name!r} is {value!r}, and {what} has no share: give a pair lower < "
+            "upper, or a `margin`, which keeps clear of both ends of all ranges."
         )
     share = _share(kind, name, value)
     lower, upper = float(base.lower[i]), float(base.upper[i])

@@ -41,6 +41,11 @@ class ProblemSummary(Summarized):
     conditions: Any
 
     @property
+    def bounds(self) -> tuple[Any, ...]:
+        """The conditions that hold at all times, those of the limits included."""
+        raise NotImplementedError
+
+    @property
     def scenes(self) -> tuple[Any, ...]:
         """The scene of every segment; none without a robot."""
         raise NotImplementedError
@@ -57,8 +62,9 @@ class ProblemSummary(Summarized):
             rows.append(("via", f"{len(self.via)} points"))
         if self.clearance is not None and self.clearance.wanted:
             rows.append(("obstacles", str(len(self.clearance.obstacles))))
-        if self.conditions:
-            rows.append(("conditions", ", ".join(each.name for each in self.conditions)))
+        asked = dict.fromkeys((*self.conditions, *self.bounds))
+        if asked:
+            rows.append(("conditions", ", ".join(each.name for each in asked)))
         return Summary("TrajectoryProblem", tuple(rows))
 
 

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from hovi.errors import InputError
+from hovi.planning.conditions.asked import as_conditions
 from hovi.planning.conditions.condition import Equation
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.notation.summaries import ProblemSummary
@@ -18,11 +19,12 @@ LIMITED_ORDERS = 2, 3
 def require_supported(problem: ProblemSummary, order: int) -> None:
     """Raise InputError for what a Lagrangian of this order does not support."""
     limits = problem.limits
+    as_conditions(tuple(dict.fromkeys((*problem.conditions, *problem.bounds))))  # of unlike names
     wanted = {
         "limits": limits is not None and bool(limits.bounded.any()),
         "obstacles": problem.clearance is not None and problem.clearance.wanted,
         "via points": bool(problem.via),
-        "conditions": bool(problem.conditions),
+        "conditions": bool(problem.conditions or problem.bounds),
         "goals of frames": isinstance(problem.goal, FrameGoal),
     }
     named = [what for what, is_wanted in wanted.items() if is_wanted]
@@ -33,7 +35,7 @@ def require_supported(problem: ProblemSummary, order: int) -> None:
         )
     if limits is not None:
         limits.require_order(order)
-    if any("tau" in each.y.needs for each in problem.conditions) and not problem.scenes:
+    if any("tau" in each.y.needs for each in problem.bounds) and not problem.scenes:
         raise InputError(
             "a condition on torques needs a Lagrangian of a scene, and this one is about no robot: "
             "leave it out, or name q, v, a and t alone."
@@ -63,6 +65,6 @@ def needs_torques(problem: ProblemSummary) -> bool:
     """Whether torques are part of the cost, are bounded, or vanish at passive joints."""
     limits = problem.limits
     bounded = limits is not None and limits.on_torques
-    bounded = bounded or any("tau" in each.y.needs for each in problem.conditions)
+    bounded = bounded or any("tau" in each.y.needs for each in problem.bounds)
     passive = any(scene.passive for scene in problem.scenes)
     return bounded or passive or problem.ld.lagrangian.needs_torques

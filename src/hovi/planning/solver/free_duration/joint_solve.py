@@ -37,7 +37,7 @@ def solves_jointly(problem: TrajectoryProblem) -> bool:
     first solve; not from a start outside its limits, whose way back takes a time of its own; nor on
     grids of so many intervals that they need the merge tree.
     """
-    simple = not (problem.constrained or problem.periodic or problem.via or problem.conditions)
+    simple = not (problem.constrained or problem.periodic or problem.via or problem.bounds)
     timed = problem.ld.lagrangian.timed or problem.ld.segments is not None
     limits = problem.limits
     rates = limits is not None and (limits.on_torque_rate or bool(limits.excused))

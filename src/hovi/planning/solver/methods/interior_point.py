@@ -21,7 +21,7 @@ from hovi.planning.solver.methods.feasibility import feasible_motion
 from hovi.planning.solver.methods.limits_between_points import tightened, usable
 from hovi.planning.solver.methods.method import Guess, Method, Report
 from hovi.planning.solver.methods.torque_rates_last import with_torque_rates_last
-from hovi.planning.solver.non_finite import non_finite_sentence
+from hovi.planning.solver.non_finite import non_finite_condition, non_finite_sentence
 from hovi.planning.solver.outcome.cost_with_time import cost_of
 from hovi.planning.solver.status import Status, diverged, infeasible_sentence, unfinished
 from hovi.system.deadline import Deadline, OutOfTimeError
@@ -173,7 +173,7 @@ def _non_finite(search: BoundedSearch, path: DiscretePath, cost: float, excess: 
     excess: the largest over any limit, between the points too.
     """
     if np.isfinite(cost) and not np.isnan(excess):
-        return ""
+        return non_finite_condition(search.problem, path)
     at_points = non_finite_sentence(search.problem, path)
     return at_points or f"{search.worst(path)}, between the quadrature points"
 

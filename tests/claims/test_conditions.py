@@ -1,0 +1,335 @@
+"""Conditions of a user: what is asked holds between the nodes, too, or there is no success."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import hovi
+from hovi.errors import InputError, SceneError
+
+START, GOAL = np.array([0, -1.5, 1.5, 0, 0, 0.0]), np.array([1.0, -1.0, 1.0, 0.5, 0.5, 0.5])
+OPTIONS: dict[str, Any] = {"self_collision": False}
+
+
+def powers(motion: hovi.Trajectory, robot: hovi.Robot) -> np.ndarray:
+    """tau v of every joint at many times, by Pinocchio alone, shape (M, nv)."""
+    at = motion.sample(np.linspace(0.0, motion.duration, 4001))
+    data = robot.model.createData()
+    jets = zip(at.q, at.v, at.a, strict=True)
+    return np.array([pin.rnea(robot.model, data, q, v, a) * v for q, v, a in jets])
+
+
+def heights(motion: hovi.Trajectory, robot: hovi.Robot, t: np.ndarray) -> np.ndarray:
+    """The height of tool0, shape (M,)."""
+    return np.array([robot.frame_pose("tool0", q)[2, 3] for q in motion.configurations(t)])
+
+
+def power(most: float, **more: Any) -> hovi.Condition:
+    return hovi.Condition("tau * v", hovi.Between(-most, most), name="power", unit="W", **more)
+
+
+@pytest.fixture(scope="module")
+def scene(ur5: hovi.Robot) -> hovi.Scene:
+    return hovi.Scene(ur5, [hovi.effects.Gravity()])
+
+
+@pytest.fixture(scope="module")
+def free(scene: hovi.Scene) -> hovi.Solution:
+    """The motion without any condition: it takes 47 W."""
+    return hovi.plan(scene, START, GOAL, 1.5, **OPTIONS)
+
+
+@pytest.fixture(scope="module")
+def limited(scene: hovi.Scene) -> hovi.Solution:
+    return hovi.plan(scene, START, GOAL, 1.5, limits={"power": 28.0}, **OPTIONS)
+
+
+def test_a_limit_on_the_power_holds_between_the_nodes(
+    free: hovi.Solution, limited: hovi.Solution, ur5: hovi.Robot
+) -> None:
+    assert np.abs(powers(free.trajectory, ur5)).max() > 45.0
+    assert limited.success, limited.message
+    assert np.abs(powers(limited.trajectory, ur5)).max() <= 28.0 + 2e-6 * 56.0
+    assert free.cost < limited.cost < 1.1 * free.cost
+    assert limited.accuracy is not None
+    assert limited.accuracy.reached
+    assert 0.0 <= limited.margins().conditions["power"] < 1e-3
+
+
+def test_an_inactive_limit_changes_nothing(scene: hovi.Scene, free: hovi.Solution) -> None:
+    loose = hovi.plan(scene, START, GOAL, 1.5, conditions=[power(500.0)], **OPTIONS)
+    assert loose.success
+    assert loose.cost == pytest.approx(free.cost, rel=1e-5)
+    most = np.abs(powers(loose.trajectory, scene.robot)).max()
+    assert loose.margins().conditions["power"] == pytest.approx((500.0 - most) / 1000.0, rel=1e-3)
+
+
+def test_a_formula_a_function_and_a_key_of_limits_are_one_condition(
+    scene: hovi.Scene, limited: hovi.Solution
+) -> None:
+    def product(v: Any, tau: Any) -> Any:
+        return tau * v
+
+    given: tuple[str | Callable[..., Any], ...] = ("tau * v", product)
+    for function in given:
+        asked = hovi.Condition(function, hovi.Between(-28.0, 28.0), name="power")
+        found = hovi.plan(scene, START, GOAL, 1.5, conditions=[asked], **OPTIONS)
+        assert found.cost == pytest.approx(limited.cost, rel=1e-6)
+
+
+def test_replan_and_advance_keep_a_limit_on_the_power(
+    limited: hovi.Solution, ur5: hovi.Robot
+) -> None:
+    later = limited.advance(0.3)
+    for motion in (
+        limited.replan(goal=GOAL + 0.03),
+        later,
+        later.advance(0.2, duration=1.2),
+        limited.replan(start=START + 0.02),
+    ):
+        assert motion.success, motion.message
+        assert np.abs(powers(motion.trajectory, ur5)).max() <= 28.0 + 2e-6 * 56.0
+
+
+def test_too_little_power_is_infeasible_and_named(scene: hovi.Scene) -> None:
+    found = hovi.plan(scene, START, GOAL, 1.5, limits={"power": 1.0}, **OPTIONS)
+    assert found.status is hovi.Status.INFEASIBLE
+    assert not found.usable
+    for words in ("condition 'power' of 'shoulder_lift_joint' reaches", " W at t = ", "is -1"):
+        assert words in found.violation, found.violation
+
+
+def test_a_motion_that_exceeds_a_condition_is_no_success(
+    free: hovi.Solution, ur5: hovi.Robot
+) -> None:
+    """Its largest power, in words."""
+    asked = dataclasses.replace(free.problem, conditions=[power(40.0)])  # type: ignore[type-var]
+    judged = dataclasses.replace(free, problem=asked)
+    P = powers(free.trajectory, ur5)
+    i = int(np.abs(P).max(axis=0).argmax())
+    assert judged.violation.startswith(f"condition 'power' of entry {i} reaches -46.7")
+    assert not judged.usable
+
+
+@pytest.mark.parametrize("smooth", [False, True])
+def test_the_power_of_a_small_robot_is_limited(two_link: hovi.Robot, smooth: bool) -> None:
+    """In segments, smooth or not, and with every joint's own bounds."""
+    scene = hovi.Scene(two_link, [hovi.effects.Gravity()])
+    names = two_link.joint_names
+    alone = hovi.plan(scene, [0.0, 0.0], [1.0, 0.5], 1.0, limits="none", smooth=smooth, **OPTIONS)
+    P = powers(alone.trajectory, two_link)
+    most = 0.8 * np.abs(P).max(axis=0)
+    limits = {"base": "none", "power": dict(zip(names, most.tolist(), strict=True))}
+    found = hovi.plan(scene, [0.0, 0.0], [1.0, 0.5], 1.0, limits=limits, smooth=smooth, **OPTIONS)
+    assert found.success, found.message
+    assert (np.abs(powers(found.trajectory, two_link)) <= most * (1 + 4e-6)).all()
+    assert found.cost > alone.cost
+
+
+def test_a_sequence_keeps_the_power(scene: hovi.Scene) -> None:
+    segments = [hovi.Segment(GOAL, 1.5), hovi.Segment(START, 1.5)]
+    found = hovi.plan_sequence(scene, START, segments, limits={"power": 28.0}, **OPTIONS)
+    assert found.success, found.message
+    assert np.abs(powers(found.trajectory, scene.robot)).max() <= 28.0 + 2e-6 * 56.0
+    segments[0] = hovi.Segment(GOAL, 1.5, limits={"power": 28.0})
+    with pytest.raises(InputError, match="limits on the power must be those of all segments"):
+        hovi.plan_sequence(scene, START, segments, **OPTIONS)
+
+
+def test_among_obstacles_and_links_the_power_is_limited_too(
+    scene: hovi.Scene, ur5: hovi.Robot
+) -> None:
+    ball = hovi.Sphere([0.5, 0.5, 0.3], 0.1)
+    found = hovi.plan(scene, START, GOAL, 1.5, limits={"power": 32.0}, obstacles=[ball])
+    assert found.success, found.message
+    assert np.abs(powers(found.trajectory, ur5)).max() <= 32.0 + 2e-6 * 64.0
+    assert found.margins().distance >= 0.01 - 1e-6  # type: ignore[operator]
+
+
+def test_a_free_duration_and_several_starts_keep_the_power(scene: hovi.Scene) -> None:
+    limits = {"power": 28.0}
+    given: tuple[tuple[Any, dict[str, Any]], ...] = (
+        ((0.8, 3.0), {"time_weight": 50.0}),
+        (1.5, {"starts": 3, "processes": 2}),
+    )
+    for duration, more in given:
+        found = hovi.plan(scene, START, GOAL, duration, limits=limits, **more, **OPTIONS)
+        assert found.success, found.message
+        assert np.abs(powers(found.trajectory, scene.robot)).max() <= 28.0 + 2e-6 * 56.0
+
+
+def test_bounds_may_change_with_time(scene: hovi.Scene) -> None:
+    def most(t: float) -> float:
+        return 40.0 - 5.0 * t
+
+    asked = hovi.Condition(
+        "tau * v", hovi.Between(lambda t: -most(t), most), name="power", scale=80
+    )
+    found = hovi.plan(scene, START, GOAL, 1.5, conditions=[asked], **OPTIONS)
+    assert found.success, found.message
+    t = np.linspace(0.0, found.trajectory.duration, 4001)
+    over = np.abs(powers(found.trajectory, scene.robot)).max(axis=1) - (40.0 - 5.0 * t)
+    assert -0.5 < over.max() <= 2e-6 * 80
+    with pytest.raises(InputError, match="'power' depends on time, which begins anew"):
+        found.advance(0.3)
+
+
+def test_a_frame_stays_above_a_height(scene: hovi.Scene, free: hovi.Solution) -> None:
+    t = np.linspace(0.0, 1.5, 4001)
+    least = 0.2
+    assert heights(free.trajectory, scene.robot, t).min() < least - 0.1
+    asked = hovi.Condition('position["tool0", "z"]', hovi.Between(lower=least), name="height")
+    found = hovi.plan(scene, START, GOAL, 1.5, conditions=[asked], **OPTIONS)
+    assert found.success, found.message
+    low = heights(found.trajectory, scene.robot, t).min()
+    assert least - 2e-6 <= low < least + 1e-3
+    again = found.replan(goal=GOAL + 0.01)
+    assert again.success, again.message
+    assert heights(again.trajectory, scene.robot, t).min() >= least - 2e-6
+
+
+def test_a_frame_has_a_height_at_given_times(scene: hovi.Scene) -> None:
+    asked = hovi.Condition(
+        'position["tool0", "z"]', hovi.Equal(0.5), hovi.AtTimes([0.7, 1.2]), name="height"
+    )
+    found = hovi.plan(scene, START, GOAL, 1.5, conditions=[asked], **OPTIONS)
+    later = found.advance(0.8)
+    for motion, times in ((found, [0.7, 1.2]), (found.replan(goal=GOAL + 0.02), [0.7, 1.2])):
+        assert motion.success, motion.message
+        z = heights(motion.trajectory, scene.robot, np.array(times))
+        np.testing.assert_allclose(z, 0.5, atol=1e-9)
+    assert later.success, later.message
+    np.testing.assert_allclose(
+        heights(later.trajectory, scene.robot, np.array([0.4])), 0.5, atol=1e-9
+    )
+
+
+def test_what_is_asked_at_the_end_needs_something_free_there(scene: hovi.Scene) -> None:
+    asked = hovi.Condition('position["tool0", "z"]', hovi.Equal(0.5), hovi.AtTimes(1.5), name="z")
+    anywhere = hovi.State(GOAL, free=["all"])
+    found = hovi.plan(scene, START, anywhere, 1.5, conditions=[asked], **OPTIONS)
+    assert found.success, found.message
+    assert heights(found.trajectory, scene.robot, np.array([1.5])) == pytest.approx(0.5, abs=1e-9)
+    with pytest.raises(InputError, match="where the goal gives the state"):
+        hovi.plan(scene, START, GOAL, 1.5, conditions=[asked], **OPTIONS)
+
+
+def test_a_value_that_cannot_be_met_is_named(scene: hovi.Scene) -> None:
+    asked = hovi.Condition('position["tool0", "z"]', hovi.Equal(5.0), hovi.AtTimes(0.7), name="sky")
+    found = hovi.plan(scene, START, GOAL, 1.5, conditions=[asked], time_limit=30.0, **OPTIONS)
+    assert not found.success
+    assert "condition 'sky' at t = 0.7 s" in found.violation
+
+
+def test_a_scene_file_limits_the_power(models: Path, tmp_path: Path) -> None:
+    text = (models / "ur5_reach_limited.toml").read_text()
+    task = hovi.load_task(models / "ur5_reach_limited.toml")
+    free = hovi.plan_task(task)
+    P = np.abs(powers(free.trajectory, task.scene.robot)).max(axis=0)
+    i = int(P.argmax())
+    joint, most = task.scene.robot.joint_names[i], round(0.8 * float(P[i]), 3)
+    file = tmp_path / "scene.toml"
+
+    def limited_to(bound: str) -> hovi.Task:
+        file.write_text(text.replace("[limits]", f"[limits]\npower = {{ {joint} = {bound} }}"))
+        return hovi.load_task(file)
+
+    task = limited_to(str(most))
+    found = hovi.plan_task(task)
+    assert found.success, found.message
+    assert np.abs(powers(found.trajectory, task.scene.robot))[:, i].max() <= most * (1 + 4e-6)
+    hovi.save_task(task, tmp_path / "again.toml")
+    assert hovi.load_task(tmp_path / "again.toml").options.limits == task.options.limits
+    for bound in ("-3", '"50 %"', "[2, 1]"):
+        with pytest.raises(SceneError, match=r"line \d+: .*limits\.power"):
+            limited_to(bound)
+
+
+def broken(function: Any, on: Any = None, **more: Any) -> Callable[[], hovi.Condition]:
+    return lambda: hovi.Condition(function, on or hovi.Between(-1, 1), name="odd", **more)
+
+
+REFUSED: dict[str, tuple[Callable[[], Any], str]] = {
+    "constant": (broken(lambda q: 3.0), "depends on none of q, v, a and tau"),
+    "time alone": (broken(lambda t: t), "depends on none of q, v, a and tau"),
+    "no arguments": (broken(lambda: 1.0), "depends on none of q, v, a and tau"),
+    "jerk": (broken(lambda jerk: jerk), "conditions on the jerk and on the torque rate"),
+    "typo": (broken(lambda qq: qq), "none of q, v, a, tau and t"),
+    "text": (broken("tau * w"), "names 'w', which is unknown"),
+    "matrix": (broken(lambda q: q @ q.T), "a column of one or more values"),
+    "nothing": (broken(lambda q: None), "must return a CasADi expression"),
+    "number": (broken(3.0), "the function of a condition must be"),
+    "bounds": (broken("q", hovi.Between([-1, -2], 1)), "must be one number or 6"),
+    "scale": (broken("q", scale=[1.0, 2.0]), "must be one number or 6"),
+    "no scale": (broken("q", scale=-1.0), "must be positive"),
+    "tolerance": (broken("q", tolerance=0.0), "needs a positive tolerance"),
+    "names": (broken("q", of=("elbow",)), "needs 6 names"),
+    "set": (broken("q", 3), "needs a hovi.Between or a hovi.Equal"),
+    "along": (broken("q", hovi.Equal()), "an equation along the whole motion"),
+    "bounds at times": (broken("q", where=hovi.AtTimes(0.5)), "which hold at all times"),
+    "torque at times": (
+        broken("tau", hovi.Equal(), where=hovi.AtTimes(0.5)),
+        "must be a function of q, v and t, but it depends on tau",
+    ),
+    "values": (broken("q", hovi.Equal([1.0, 2.0]), where=hovi.AtTimes(0.5)), "one number or 6"),
+    "late": (broken('q["elbow_joint"]', hovi.Equal(), where=hovi.AtTimes(2.5)), "2.5 s"),
+    "NaN": (lambda: hovi.Between(np.nan, 1.0), "must be numbers"),
+    "empty": (lambda: hovi.Between(1.0, 1.0), "lower must be less than upper"),
+    "no value": (lambda: hovi.Equal(np.nan), "finite numbers"),
+    "no time": (lambda: hovi.AtTimes([]), "positive times"),
+    "varying": (broken("q", hovi.Between(lambda t: -t - 1.0, 1.0)), "needs a `scale`"),
+    "three": (lambda: 3, "must be a list of hovi.Condition"),
+}
+
+
+@pytest.mark.parametrize("what", REFUSED)
+def test_what_cannot_be_asked_is_refused_in_one_sentence(scene: hovi.Scene, what: str) -> None:
+    make, sentence = REFUSED[what]
+
+    def planned() -> hovi.Solution:
+        asked = make()
+        given = [asked] if isinstance(asked, hovi.Condition) else asked
+        return hovi.plan(scene, START, GOAL, 1.5, conditions=given, **OPTIONS)
+
+    with pytest.raises(hovi.HoviError) as refused:
+        planned()
+    assert sentence in str(refused.value)
+    assert str(refused.value).count("\n") == 0
+
+
+def test_two_conditions_have_two_names(scene: hovi.Scene) -> None:
+    with pytest.raises(InputError, match="two conditions have the name 'power'"):
+        hovi.plan(scene, START, GOAL, 1.5, conditions=[power(50.0), power(60.0)], **OPTIONS)
+    with pytest.raises(InputError, match="two conditions have the name 'power'"):
+        hovi.plan(
+            scene, START, GOAL, 1.5, conditions=[power(50.0)], limits={"power": 60.0}, **OPTIONS
+        )
+
+
+def test_a_condition_without_a_value_is_said(scene: hovi.Scene) -> None:
+    asked = hovi.Condition(lambda q: (-1.0 - q[0] ** 2) ** 0.5, hovi.Between(-1, 1), name="root")
+    found = hovi.plan(scene, START, GOAL, 1.5, conditions=[asked], continuation=False, **OPTIONS)
+    assert not found.success
+    assert "condition 'root' has no finite value at t = " in found.message
+
+
+def test_what_depends_on_time_needs_a_fixed_duration(scene: hovi.Scene) -> None:
+    asked = hovi.Condition('q["elbow_joint"] - t', hovi.Between(-9, 9), name="clock")
+    with pytest.raises(InputError, match="'clock' depends on time, which a free duration"):
+        hovi.plan(scene, START, GOAL, (1.0, 2.0), conditions=[asked], **OPTIONS)
+
+
+def test_torques_need_a_robot() -> None:
+    ld = hovi.DiscreteLagrangian(
+        hovi.spline(2, 2), hovi.Grid.uniform(1.0, 4, hovi.schemes.galerkin(2))
+    )
+    asked = hovi.Condition(lambda tau: tau, hovi.Between(-1, 1), name="torque")
+    with pytest.raises(InputError, match="a condition on torques needs a Lagrangian of a scene"):
+        hovi.TrajectoryProblem(ld, hovi.State([0, 0]), hovi.State([1, 1]), conditions=[asked])
