@@ -801,7 +801,7 @@ _rule(
     "legs between seams",
     "A sequence among obstacles is solved leg by leg first.",
     "_by_legs",
-    "legs_of(search.problem)",
+    "subproblems_of(search.problem)",
     "[]",
 )
 _rule(

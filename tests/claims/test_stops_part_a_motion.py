@@ -48,14 +48,14 @@ def solved(problem: hovi.TrajectoryProblem) -> hovi.Solution:
     return found
 
 
-def assert_joined(whole: hovi.Solution, legs: Sequence[hovi.Solution], rel: float) -> None:
-    assert whole.cost == pytest.approx(sum(leg.cost for leg in legs), rel=rel)
+def assert_joined(whole: hovi.Solution, pieces: Sequence[hovi.Solution], rel: float) -> None:
+    assert whole.cost == pytest.approx(sum(piece.cost for piece in pieces), rel=rel)
     begin = 0.0
-    for leg in legs:
-        t = np.linspace(0.0, leg.trajectory.duration, 60)[1:-1]
-        here, there = whole.trajectory.configurations(begin + t), leg.trajectory.configurations(t)
+    for piece in pieces:
+        t = np.linspace(0.0, piece.trajectory.duration, 60)[1:-1]
+        here, there = whole.trajectory.configurations(begin + t), piece.trajectory.configurations(t)
         np.testing.assert_allclose(here, there, rtol=0, atol=1e-8 if rel < 1e-9 else 2e-3)
-        begin += leg.trajectory.duration
+        begin += piece.trajectory.duration
 
 
 @pytest.mark.parametrize("smooth", [False, True])
@@ -68,18 +68,18 @@ def test_costs_of_the_legs_add_up_and_their_paths_join(smooth: bool, limited: bo
     ends = State([0.0, 0.0]), END
     whole = hovi.TrajectoryProblem.of_segments(parts(smooth), *ends, bounds, tuple(via))
     states = [ends[0], *given, END]
-    legs = [
+    pieces = [
         hovi.TrajectoryProblem(ld, states[i], states[i + 1], bounds[i])
         for i, ld in enumerate(parts(smooth))
     ]
-    found = [solved(leg) for leg in legs]
-    if smooth:  # a leg of its own begins and ends without acceleration
-        assert solved(whole).cost < 0.99 * sum(leg.cost for leg in found)
+    found = [solved(piece) for piece in pieces]
+    if smooth:  # a piece of its own begins and ends without acceleration
+        assert solved(whole).cost < 0.99 * sum(piece.cost for piece in found)
         return
     assert_joined(solved(whole), found, 1e-4 if limited else 1e-10)
     if limited:
-        fastest = [np.abs(leg.trajectory.sample(np.linspace(0, T, 2001)).v).max()
-                   for leg, T in zip(found, TIMES, strict=True)]  # fmt: skip
+        fastest = [np.abs(piece.trajectory.sample(np.linspace(0, T, 2001)).v).max()
+                   for piece, T in zip(found, TIMES, strict=True)]  # fmt: skip
         assert (np.array(fastest) <= np.array(FASTEST) * (1 + 2e-6)).all()
         assert sum(v > 0.999 * most for v, most in zip(fastest, FASTEST, strict=True)) >= 2
 
@@ -90,6 +90,6 @@ def test_a_velocity_that_is_free_joins_two_segments() -> None:
     whole = solved(hovi.TrajectoryProblem.of_segments(segments, start, END, None, via))
     first = hovi.TrajectoryProblem.of_segments(segments[:2], start, State(TURN), None, via[:1])
     last = hovi.TrajectoryProblem(segments[2], State(TURN), END)
-    legs = [solved(first), solved(last)]
-    assert_joined(whole, legs, 1e-10)
+    pieces = [solved(first), solved(last)]
+    assert_joined(whole, pieces, 1e-10)
     assert np.abs(whole.trajectory.v[STEPS[0]]).max() > 0.1

@@ -13,7 +13,7 @@ from PIL import Image
 
 import hovi
 from hovi.discrete.grid import DiscretePath
-from hovi.discrete.measures.segment_spans import SEGMENT_NAMES, segment_spans
+from hovi.discrete.measures.motion_segments import SEGMENT_NAMES, motion_segments
 from hovi.discrete.trajectory import Trajectory
 from hovi.effects import Gravity
 from hovi.errors import DisplayError
@@ -298,11 +298,11 @@ def test_names_of_segments_are_above_the_note_on_distant_limits() -> None:
 def test_names_of_segments_from_a_file_that_do_not_fit_are_numbers() -> None:
     motion = _two_segments()
     for names in (["a"], ["a", 3], "ab", None, {"a": 1}):
-        spans = segment_spans(dataclasses.replace(motion, metadata={SEGMENT_NAMES: names}))
+        spans = motion_segments(dataclasses.replace(motion, metadata={SEGMENT_NAMES: names}))
         assert [each.name for each in spans] == ["segment 1", "segment 2"]
         assert [(each.begin, each.end) for each in spans] == [(0.0, 1.0), (1.0, 2.0)]
     named = dataclasses.replace(motion, metadata={SEGMENT_NAMES: ["a", "b"]})
-    assert [each.name for each in segment_spans(named)] == ["a", "b"]
+    assert [each.name for each in motion_segments(named)] == ["a", "b"]
 
 
 def _two_segments() -> hovi.Trajectory:

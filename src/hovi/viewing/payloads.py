@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from hovi.discrete.measures.segment_spans import segment_spans
+from hovi.discrete.measures.motion_segments import motion_segments
 from hovi.discrete.trajectory import Trajectory
 from hovi.robot.model import frame_named
 from hovi.robot.robot import Robot
@@ -44,7 +44,9 @@ class Payloads:
         scenes = [trajectory.scene] if parts is None else list(parts.scenes)
         carried = [_payloads(scene) for scene in scenes if scene is not None]
         begins = (
-            np.array([span.begin for span in segment_spans(trajectory)]) if parts else np.zeros(1)
+            np.array([segment.begin for segment in motion_segments(trajectory)])
+            if parts
+            else np.zeros(1)
         )
         items = tuple(dict.fromkeys(item for each in carried for item in each))
         flags = [np.array([item in each for each in carried]) for item in items]

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from matplotlib.axes import Axes
 
-from hovi.discrete.measures.segment_spans import segment_spans
+from hovi.discrete.measures.motion_segments import motion_segments
 from hovi.discrete.trajectory import Trajectory
 
 _GRAY = "0.45"
@@ -17,12 +17,12 @@ _ABOVE_TITLE = 16.0
 
 def draw_segments(axes: Sequence[Axes], trajectory: Trajectory) -> None:
     """Mark where segments meet in all axes, and name them above the first, and above its title."""
-    spans = segment_spans(trajectory)
+    segments = motion_segments(trajectory)
     height = _ABOVE_TITLE if axes[0].get_title(loc="right") else 2.0
-    for each in spans[1:]:
+    for each in segments[1:]:
         for ax in axes:
             ax.axvline(each.begin, color=_GRAY, linewidth=0.9, linestyle=":")
-    for each in spans:
+    for each in segments:
         axes[0].annotate(
             each.name[:_LONGEST_NAME],
             ((each.begin + each.end) / 2, 1.0),

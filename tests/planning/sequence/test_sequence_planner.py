@@ -18,7 +18,7 @@ import hovi
 from hovi import PlanOptions
 from hovi.discrete.state import State
 from hovi.errors import HoviError, InputError, SceneError
-from hovi.planning.sequence.branches import Leg, chosen_branches
+from hovi.planning.sequence.branches import MoveToGoal, chosen_branches
 from hovi.planning.sequence.segment import Segment
 from hovi.planning.sequence.sequence_job import job_of
 from hovi.planning.task_file.reading import load_task
@@ -250,19 +250,19 @@ def test_the_branches_of_frames_are_the_cheapest_way_through_them_all() -> None:
     options = PlanOptions(limits="none").on(scene())
     job = job_of(scene(), State([0.0, 0.0]), goals, given, options)
     free = -np.full(2, np.inf), np.full(2, np.inf)
-    legs = [
-        Leg((i,), begin, end, goal, free)
+    moves = [
+        MoveToGoal((i,), begin, end, goal, free)
         for i, (begin, end, goal) in enumerate(
             zip((0.0, 0.6, 1.5), (0.6, 1.5, 2.0), goals, strict=True)
         )
     ]
-    start = Leg((), 0.0, 0.0, State([0.0, 0.0]), free)
-    _, chosen = chosen_branches(robot, job.lagrangian(), start, legs, options.clearance)
+    start = MoveToGoal((), 0.0, 0.0, State([0.0, 0.0]), free)
+    _, chosen = chosen_branches(robot, job.lagrangian(), start, moves, options.clearance)
 
     def cost(nodes: list[Array]) -> float:
         total = 0.0
-        for (a, b), leg in zip(itertools.pairwise([np.zeros(2), *nodes]), legs, strict=True):
-            grid = hovi.Grid.uniform(leg.end - leg.begin, 4, hovi.schemes.by_name("galerkin-0x8"))
+        for (a, b), move in zip(itertools.pairwise([np.zeros(2), *nodes]), moves, strict=True):
+            grid = hovi.Grid.uniform(move.end - move.begin, 4, hovi.schemes.by_name("galerkin-0x8"))
             ld = hovi.DiscreteLagrangian(scene().effort_lagrangian(), grid)
             problem = hovi.TrajectoryProblem(ld, State(a), State(b))
             total += problem.ld.action(problem.guess("cubic"))

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from hovi.discrete.measures.segment_spans import SegmentSpan, segment_spans
+from hovi.discrete.measures.motion_segments import MotionSegment, motion_segments
 from hovi.planning.solver.requirements.limit_margins import LimitMargins
 from hovi.planning.solver.solver import Solution
 
@@ -20,10 +20,10 @@ def segment_lines(solution: Solution, margins: Mapping[str, LimitMargins]) -> li
     return [
         (
             "segment",
-            f"{span.name!r} from {span.begin:.6g} to {span.end:.6g} s, cost {cost:.6g}"
-            f"{_tightest(margins.get(span.name))}",
+            f"{segment.name!r} from {segment.begin:.6g} to {segment.end:.6g} s, cost {cost:.6g}"
+            f"{_tightest(margins.get(segment.name))}",
         )
-        for span, cost in _costs(solution)
+        for segment, cost in _costs(solution)
     ]
 
 
@@ -40,17 +40,17 @@ def segments_json(solution: Solution, margins: Mapping[str, LimitMargins]) -> di
     margins: to the limits of each segment, by its name.
     """
     rows: list[dict[str, Any]] = []
-    for span, cost in _costs(solution):
-        row = {"name": span.name, "begin": span.begin, "end": span.end, "cost": cost}
-        own = margins.get(span.name)
+    for segment, cost in _costs(solution):
+        row = {"name": segment.name, "begin": segment.begin, "end": segment.end, "cost": cost}
+        own = margins.get(segment.name)
         rows.append(row | {"limits": None if own is None else own.by_kind()})
     return {"segments": rows} if rows else {}
 
 
-def _costs(solution: Solution) -> list[tuple[SegmentSpan, float]]:
+def _costs(solution: Solution) -> list[tuple[MotionSegment, float]]:
     """The segments with their costs, which sum to that of the motion."""
-    spans = segment_spans(solution.trajectory)
-    if not spans or solution.problem is None:
+    segments = motion_segments(solution.trajectory)
+    if not segments or solution.problem is None:
         return []
     values = solution.problem.ld.values(solution.trajectory.path)
-    return [(span, float(np.sum(values[span.intervals]))) for span in spans]
+    return [(segment, float(np.sum(values[segment.intervals]))) for segment in segments]

@@ -58,20 +58,20 @@ def path_guesses(
     space = FreeSpace.of(problem, direct.q[0])
     if space is None:
         return
-    stops = [*_stops(problem, direct.q[0]), (problem.grid.duration, direct.q[-1])]
-    t = np.array([0.0, *(time for time, _ in stops)])
-    turns = [*np.zeros((len(stops) - 1, len(space.speed))), _full_turns(problem) / space.speed]
+    waypoints = [*_waypoints(problem, direct.q[0]), (problem.grid.duration, direct.q[-1])]
+    t = np.array([0.0, *(time for time, _ in waypoints)])
+    turns = [*np.zeros((len(waypoints) - 1, len(space.speed))), _full_turns(problem) / space.speed]
     with OmplProcess() as ompl:
         for k in range(count):
-            legs, x = list[Array](), np.zeros(len(space.speed))
-            for (_, q), turn, duration in zip(stops, turns, np.diff(t), strict=True):
+            paths, x = list[Array](), np.zeros(len(space.speed))
+            for (_, q), turn, duration in zip(waypoints, turns, np.diff(t), strict=True):
                 y = x + space.x_between(space.q(x[None])[0], q) + turn
                 seeds = range(seed * 1_009 + k, (seed + 1) * 1_009, count)
                 points = fast_path(ompl, space, (x, y), seeds[:DRAWS], float(duration))
                 if points is None:
                     return
-                legs, x = [*legs, points], y
-            pieces = [motion_along(space, *leg) for leg in zip(legs, np.diff(t), strict=True)]
+                paths, x = [*paths, points], y
+            pieces = [motion_along(space, *each) for each in zip(paths, np.diff(t), strict=True)]
             yield problem.path(joined(pieces, t[:-1]))
 
 
@@ -115,11 +115,11 @@ def _time_along(points: Array) -> float:
     return float(np.abs(np.diff(points, axis=0)).max(axis=1).sum())
 
 
-def _stops(problem: TrajectoryProblem, start: Array) -> list[tuple[float, Array]]:
+def _waypoints(problem: TrajectoryProblem, start: Array) -> list[tuple[float, Array]]:
     """Times and configurations of the via points, without those of which none is known."""
     limits, clearance = problem.limits, problem.clearance
     assert clearance is not None
-    held, stops, near = {each.time: each.q for each in problem.holds}, [], start
+    held, waypoints, near = {each.time: each.q for each in problem.holds}, [], start
     unbounded = np.full(problem.coordinates.nv, np.inf)
     bounds = (-unbounded, unbounded) if limits is None else (limits.lower[0], limits.upper[0])
     for via in sorted(problem.via, key=lambda each: each.time):
@@ -130,9 +130,9 @@ def _stops(problem: TrajectoryProblem, start: Array) -> list[tuple[float, Array]
             with suppress(UnreachableError):
                 q = configurations(problem.robot, goal, near, bounds, clearance)[0]
         if q is not None:
-            stops.append((via.time, q))
+            waypoints.append((via.time, q))
             near = q
-    return stops
+    return waypoints
 
 
 def motion_along(space: FreeSpace, points: Array, duration: float) -> Curve:

@@ -11,7 +11,7 @@ from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.goal_clearance import goal_in_obstacle
 from hovi.planning.problem.limits import Limits
 from hovi.planning.problem.presolve.end_torques import unavoidable_torque
-from hovi.planning.problem.presolve.legs import Stop, states_too_far_apart
+from hovi.planning.problem.presolve.moves import Waypoint, states_too_far_apart
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.problem.way_back.end_state import EndState
 from hovi.planning.problem.way_back.led_back import refused
@@ -89,7 +89,9 @@ def _duration_too_short(problem: TrajectoryProblem, limits: Limits) -> str:
     if isinstance(last, Periodic):
         timed = problem.ld.lagrangian.timed
         first, last = last.ends(first, problem.coordinates, problem.ld.k, timed)
-    stops = [Stop(f"via point at {via.time:g} s", via.time, via.goal) for via in problem.via]
-    stops = sorted(stops, key=lambda stop: stop.time)
-    ends = Stop("start", 0.0, first), Stop("goal", problem.grid.duration, last)
-    return states_too_far_apart(problem.coordinates, [ends[0], *stops, ends[1]], limits)
+    waypoints = [
+        Waypoint(f"via point at {via.time:g} s", via.time, via.goal) for via in problem.via
+    ]
+    waypoints = sorted(waypoints, key=lambda waypoint: waypoint.time)
+    ends = Waypoint("start", 0.0, first), Waypoint("goal", problem.grid.duration, last)
+    return states_too_far_apart(problem.coordinates, [ends[0], *waypoints, ends[1]], limits)

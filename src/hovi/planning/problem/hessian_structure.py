@@ -46,8 +46,10 @@ class ActionStructure:
     @cached_property
     def metric(self) -> dict[Coordinates, Array]:
         """The trust region's metric in both kinds of columns, (N, m, m)."""
-        spans = spans_between(self.grid, self.holds)
-        return {name: action_metric(self.grid, name, spans, self.periodic) for name in COORDINATES}
+        durations = durations_between(self.grid, self.holds)
+        return {
+            name: action_metric(self.grid, name, durations, self.periodic) for name in COORDINATES
+        }
 
     @cached_property
     def sizes(self) -> dict[Coordinates, Array]:
@@ -91,7 +93,7 @@ class ActionStructure:
         return MergeTree(levels, grid.intervals, grid.inner_modes, self.dof, present)
 
 
-def spans_between(grid: Grid, holds: Sequence[Hold]) -> Array:
+def durations_between(grid: Grid, holds: Sequence[Hold]) -> Array:
     """The duration between the seams before and after each interval, in [s], shape (N,).
 
     A change of a motion that is held at seams has the length of one from seam to seam.
@@ -101,12 +103,12 @@ def spans_between(grid: Grid, holds: Sequence[Hold]) -> Array:
 
 
 def action_metric(
-    grid: Grid, coordinates: Coordinates, spans: Array, periodic: bool = False
+    grid: Grid, coordinates: Coordinates, durations: Array, periodic: bool = False
 ) -> Array:
     """The trust region's metric: T^(2k-1) integral |dq^(k)|^2 over each interval, (N, m, m).
 
     For periodic motions plus integral |dq|^2 / T, as without it a translation has no length.
-    spans: T of each interval, shape (N,), in [s].
+    durations: T of each interval, shape (N,), in [s].
     """
     k = grid.order
     m = 2 * k + grid.inner_modes
@@ -114,7 +116,7 @@ def action_metric(
     for scheme, index in grid.groups:
         rows = (scheme.nodal_table if coordinates == "nodal" else scheme.regular_table)[:, k]
         own = rows.shape[1]
-        scale = (spans[index] / grid.steps[index]) ** (2 * k - 1)
+        scale = (durations[index] / grid.steps[index]) ** (2 * k - 1)
         metric[index, :own, :own] = scale[:, None, None] * ((rows.T * scheme.weights) @ rows)
         if periodic:
             rows = (scheme.nodal_table if coordinates == "nodal" else scheme.regular_table)[:, 0]

@@ -42,7 +42,7 @@ MAX_CHART_INTERVALS = 2000
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
+class JobSegment:
     """A segment of a job.
 
     end: when it ends, as a share of the duration, 1 for the last. acting: what acts in it.
@@ -80,7 +80,7 @@ class Job:
 
     grid: replaces the scheme and the intervals of the options.
     options: of the plan, with limits and tolerance resolved for the scene's robot.
-    parts: the segments of a sequence; none for one motion in one scene.
+    segments: the segments of a sequence; none for one motion in one scene.
     """
 
     scene: Scene
@@ -88,7 +88,7 @@ class Job:
     start: State
     goal: State | FrameGoal
     options: PlanOptions = field(default_factory=PlanOptions)
-    parts: tuple[Part, ...] = ()
+    segments: tuple[JobSegment, ...] = ()
 
     @cached_property
     def limits(self) -> Limits:
@@ -104,7 +104,7 @@ class Job:
     @property
     def ends(self) -> tuple[float, ...]:
         """The times at which its segments but the last end, ascending, in [s]."""
-        return tuple(part.end * self.grid.duration for part in self.parts[:-1])
+        return tuple(segment.end * self.grid.duration for segment in self.segments[:-1])
 
     @property
     def node_times(self) -> list[float]:
@@ -170,16 +170,16 @@ class Job:
         return "" if self.tolerance is None else self._graded(self.grid)[1]
 
     def _graded(self, grid: Grid) -> tuple[Grid, str]:
-        acting = [part.acting.on(self.scene) for part in self.parts] or [self.scene]
+        acting = [segment.acting.on(self.scene) for segment in self.segments] or [self.scene]
         ends = [*(T * grid.duration / self.grid.duration for T in self.ends), grid.duration]
         return graded(grid, tuple(zip(acting, ends, strict=True)))
 
     def lagrangian(self) -> Lagrangian:
         """The effort of the scene, or of the scene of every segment."""
         weight = self.options.weight
-        if not self.parts:
+        if not self.segments:
             return self.scene.effort_lagrangian(weight)
-        scenes = [part.acting.on(self.scene) for part in self.parts]
+        scenes = [segment.acting.on(self.scene) for segment in self.segments]
         return SegmentedLagrangian(tuple(x.effort_lagrangian(weight) for x in scenes), self.ends)
 
     def problem(self) -> TrajectoryProblem:

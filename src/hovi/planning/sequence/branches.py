@@ -34,8 +34,8 @@ UNKNOWN_COST = 1e200
 
 
 @dataclass(frozen=True, eq=False)
-class Leg:
-    """A part of a sequence between two goals.
+class MoveToGoal:
+    """The motion of a sequence from one goal to the next, over one segment or several.
 
     numbers: of its segments, from 0. begin, end: in [s]. goal: at its end. bounds: of q there.
     """
@@ -63,8 +63,8 @@ class _Layer:
 def chosen_branches(
     robot: Robot,
     lagrangian: Lagrangian,
-    start: Leg,
-    legs: Sequence[Leg],
+    start: MoveToGoal,
+    moves: Sequence[MoveToGoal],
     clearance: Clearance,
 ) -> tuple[State, list[End]]:
     """The start as a state, and the goals with the branch in which each is met as their guess.
@@ -73,17 +73,17 @@ def chosen_branches(
     Goals that cannot be met stay as they are.
     Raises UnreachableError for a start that cannot be met.
     """
-    for each in (start, *legs):
+    for each in (start, *moves):
         if isinstance(each.goal, FrameGoal):
             each.goal.check(robot)
     first = _branches(robot, start, None, clearance)
     layers = [_Layer(first, np.zeros(len(first)))]
-    for leg in legs:
-        layers.append(_next_layer(robot, lagrangian, leg, layers[-1], clearance))
+    for move in moves:
+        layers.append(_next_layer(robot, lagrangian, move, layers[-1], clearance))
     chosen = int(np.argmin(layers[-1].cost))
     goals: list[End] = []
-    for leg, layer in zip(reversed(legs), reversed(layers[1:]), strict=True):
-        goal = leg.goal
+    for move, layer in zip(reversed(moves), reversed(layers[1:]), strict=True):
+        goal = move.goal
         if isinstance(goal, FrameGoal) and layer.known:
             goal = replace(goal, guess=layer.q[chosen])
         goals.insert(0, goal)
@@ -95,27 +95,27 @@ def chosen_branches(
 
 
 def _next_layer(
-    robot: Robot, lagrangian: Lagrangian, leg: Leg, last: _Layer, clearance: Clearance
+    robot: Robot, lagrangian: Lagrangian, move: MoveToGoal, last: _Layer, clearance: Clearance
 ) -> _Layer:
-    """The branches of a leg's goal, with the least cost at which each is reached."""
+    """The branches of a move's goal, with the least cost at which each is reached."""
     try:
-        q, known = _branches(robot, leg, last.q[0], clearance), True
+        q, known = _branches(robot, move, last.q[0], clearance), True
     except UnreachableError:
         q, known = last.q[:1], False
     K, M = len(last.q), len(q)
     pairs = np.repeat(last.q, M, axis=0), np.tile(q, (K, 1))
-    costs = cubic_costs(lagrangian, robot, *pairs, leg.end - leg.begin, leg.begin)
+    costs = cubic_costs(lagrangian, robot, *pairs, move.end - move.begin, move.begin)
     cost = last.cost[:, None] + costs.reshape(K, M)
     cost = np.where(np.isfinite(cost), cost, UNKNOWN_COST)
     before = np.argmin(cost, axis=0)
     return _Layer(q, cost[before, np.arange(M)], before, known)
 
 
-def _branches(robot: Robot, leg: Leg, near: Array | None, clearance: Clearance) -> Array:
-    """Configurations at the goal of a leg, shape (K, nq): that at the guess alone if it has one."""
-    end = leg.goal
+def _branches(robot: Robot, move: MoveToGoal, near: Array | None, clearance: Clearance) -> Array:
+    """Configurations at a goal, shape (K, nq): that at its guess alone if it has one."""
+    end = move.goal
     if isinstance(end, State):
         return end.on(robot, "goal")[0][None]
-    first = first_configuration(robot, end, near if end.guess is None else None, leg.bounds)
-    found = configurations(robot, end, first, leg.bounds, clearance)
+    first = first_configuration(robot, end, near if end.guess is None else None, move.bounds)
+    found = configurations(robot, end, first, move.bounds, clearance)
     return found[: 1 if end.guess is not None else COMPARED]

@@ -12,43 +12,43 @@ from hovi.planning.problem.limits import Limits
 from hovi.planning.problem.presolve.findings import Findings, about_limits, slips
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.search.job import Job
-from hovi.planning.sequence.branches import End, Leg
+from hovi.planning.sequence.branches import End, MoveToGoal
 from hovi.schemes import galerkin
 
 
 def segment_findings(
-    job: Job, legs: Sequence[Leg], limits: Sequence[Limits], names: Sequence[str]
+    job: Job, moves: Sequence[MoveToGoal], limits: Sequence[Limits], names: Sequence[str]
 ) -> Findings:
     """What is found about the segments of a sequence before it is solved, with their names.
 
-    legs: of the sequence; limits are not looked at in those over several segments, nor after a goal
-    that cannot be met, which the problem itself names. limits, names: of the segments.
+    moves: of the sequence; limits are not looked at in those over several segments, nor after a
+    goal that cannot be reached, which the problem itself names. limits, names: of the segments.
     """
     told, looked_like, before = list[str](), list[str](), _as_start(job.start)
-    for leg in legs:
-        number = leg.numbers[0]
+    for move in moves:
+        number = move.numbers[0]
         if before is None:
             break
         bounds = limits[number] if number == 0 else dataclasses.replace(limits[number], strict=True)
-        problem = _alone(job, leg, before, bounds)
+        problem = _alone(job, move, before, bounds)
         looked_like += slips(problem)
-        if len(leg.numbers) == 1:
-            found = about_limits(problem, before, leg.goal)
+        if len(move.numbers) == 1:
+            found = about_limits(problem, before, move.goal)
             told += [f"in {names[number]!r} {sentence}" for sentence in found.warnings]
             if found.reason:
                 reason = f"in {names[number]!r} {found.reason}"
                 return Findings(reason, (*dict.fromkeys(looked_like), *told))
-        before = _as_start(leg.goal)
+        before = _as_start(move.goal)
     return Findings("", (*dict.fromkeys(looked_like), *told))
 
 
-def _alone(job: Job, leg: Leg, start: State, limits: Limits) -> TrajectoryProblem:
+def _alone(job: Job, move: MoveToGoal, start: State, limits: Limits) -> TrajectoryProblem:
     """The problem of a segment alone, on one interval; only its ends are looked at."""
-    scene = job.parts[leg.numbers[0]].acting.on(job.scene)
-    grid = Grid.uniform(leg.end - leg.begin, 1, galerkin(2, scene.order))
+    scene = job.segments[move.numbers[0]].acting.on(job.scene)
+    grid = Grid.uniform(move.end - move.begin, 1, galerkin(2, scene.order))
     ld = DiscreteLagrangian(scene.effort_lagrangian(job.options.weight), grid)
-    clearance = job.options.clearance.from_time(leg.begin)
-    return TrajectoryProblem(ld, start, leg.goal, limits, (), clearance)
+    clearance = job.options.clearance.from_time(move.begin)
+    return TrajectoryProblem(ld, start, move.goal, limits, (), clearance)
 
 
 def _as_start(goal: End) -> State | None:

@@ -15,8 +15,8 @@ import numpy.typing as npt
 from hovi.discrete.state import State
 from hovi.effects import Effect
 from hovi.planning.problem.notation.smoothing import smoothed
-from hovi.planning.search.job import Acting, Part
-from hovi.planning.sequence.branches import End, Leg
+from hovi.planning.search.job import Acting, JobSegment
+from hovi.planning.sequence.branches import End, MoveToGoal
 from hovi.planning.sequence.segment import Segment
 from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
@@ -30,22 +30,22 @@ SAME = 1e-6
 def smoothed_segments(
     scene: Scene,
     start: State,
-    legs: Sequence[Leg],
+    moves: Sequence[MoveToGoal],
     segments: Sequence[Segment],
-    parts: Sequence[Part],
-) -> tuple[Scene, tuple[Part, ...]]:
+    job_segments: Sequence[JobSegment],
+) -> tuple[Scene, tuple[JobSegment, ...]]:
     """The scene of a sequence with a cost on the jerk, and its segments, each with its own.
 
     One that has such a cost among its effects keeps it.
-    legs: with the goals, with the branches in which they are met. parts: the segments of the job.
+    moves: to the goals, with the branches in which they are reached. job_segments: of the job.
     Raises InputError as `smoothed` does.
     """
-    still = _standing_still(scene.robot, start, legs, len(segments))
+    still = _standing_still(scene.robot, start, moves, len(segments))
     durations = smoothed_durations([each.duration for each in segments], still)
-    found = [smoothed(scene, start, legs[-1].goal, T) for T in durations]
+    found = [smoothed(scene, start, moves[-1].goal, T) for T in durations]
     return found[0], tuple(
-        Part(part.end, _with_default(each.effects[-1], part.acting))
-        for each, part in zip(found, parts, strict=True)
+        JobSegment(segment.end, _with_default(each.effects[-1], segment.acting))
+        for each, segment in zip(found, job_segments, strict=True)
     )
 
 
@@ -68,13 +68,15 @@ def _with_default(cost: Effect, acting: Acting) -> Acting:
     return acting if known else Acting((cost, *acting.effects))
 
 
-def _standing_still(robot: Robot, start: State, legs: Sequence[Leg], number: int) -> list[bool]:
+def _standing_still(
+    robot: Robot, start: State, moves: Sequence[MoveToGoal], number: int
+) -> list[bool]:
     """Which segments end where the one before them does."""
     still, before = [False] * number, _configuration(robot, start)
-    for leg in legs:
-        here = _configuration(robot, leg.goal)
+    for move in moves:
+        here = _configuration(robot, move.goal)
         same = before is not None and here is not None and np.abs(here - before).max() <= SAME
-        still[leg.numbers[-1]] = same and len(leg.numbers) == 1
+        still[move.numbers[-1]] = same and len(move.numbers) == 1
         before = here
     return still
 

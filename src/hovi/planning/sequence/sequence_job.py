@@ -15,9 +15,9 @@ from hovi.errors import InputError, warn
 from hovi.planning.problem.limits import Limits
 from hovi.planning.problem.seams import Seam
 from hovi.planning.refinement.adaptive import MAX_FIRST_INTERVALS, first_grid
-from hovi.planning.search.job import Acting, Job, Part, stops_of
+from hovi.planning.search.job import Acting, Job, JobSegment, stops_of
 from hovi.planning.search.options import PlanOptions
-from hovi.planning.sequence.branches import End, Leg, chosen_branches
+from hovi.planning.sequence.branches import End, MoveToGoal, chosen_branches
 from hovi.planning.sequence.segment import Segment, names_of
 from hovi.planning.sequence.segment_findings import segment_findings
 from hovi.planning.sequence.segment_smoothing import smoothed_segments
@@ -44,27 +44,29 @@ def job_of(
     Raises InputError, SceneError or UnreachableError for what defines no sequence.
     """
     ends = tuple(accumulate(each.duration for each in segments))
-    parts = tuple(
-        Part(end / ends[-1], Acting(tuple(each.effects)))
+    job_segments = tuple(
+        JobSegment(end / ends[-1], Acting(tuple(each.effects)))
         for each, end in zip(segments, ends, strict=True)
     )
     limits = limits_of(scene, segments, options)
     grid = sequence_grid(segments, options, scene.order)
-    first = Job(scene, grid, State(()), State(()), options, parts)
-    legs = _legs(goals, ends, limits)
-    begin = Leg((), 0.0, 0.0, start, (limits[0].lower[0], limits[0].upper[0]))
+    first = Job(scene, grid, State(()), State(()), options, job_segments)
+    moves = _moves(goals, ends, limits)
+    begin = MoveToGoal((), 0.0, 0.0, start, (limits[0].lower[0], limits[0].upper[0]))
     known, reached = chosen_branches(
-        scene.robot, first.lagrangian(), begin, legs, options.clearance
+        scene.robot, first.lagrangian(), begin, moves, options.clearance
     )
-    legs = [dataclasses.replace(leg, goal=goal) for leg, goal in zip(legs, reached, strict=True)]
+    moves = [
+        dataclasses.replace(move, goal=goal) for move, goal in zip(moves, reached, strict=True)
+    ]
     if options.smooth:
-        scene, parts = smoothed_segments(scene, known, legs, segments, parts)
+        scene, job_segments = smoothed_segments(scene, known, moves, segments, job_segments)
         grid = sequence_grid(segments, options, scene.order)
-    job = Job(scene, grid, known, reached[-1], options, parts)
-    found = segment_findings(job, legs, limits, names_of(segments))
+    job = Job(scene, grid, known, reached[-1], options, job_segments)
+    found = segment_findings(job, moves, limits, names_of(segments))
     for sentence in found.warnings:
         warn(sentence)
-    seams = [Seam(leg.end, leg.goal, unreachable=found.reason) for leg in legs[:-1]]
+    seams = [Seam(move.end, move.goal, unreachable=found.reason) for move in moves[:-1]]
     if any(each.limits is not None for each in segments):
         job = job.with_options(limits=Limits.of_segments(limits, ends[:-1]))
     job = job.with_options(via=(*seams, *options.via))
@@ -133,11 +135,11 @@ def _distributed(total: int, weights: Array, least: int) -> npt.NDArray[np.intp]
     return np.asarray(numbers)
 
 
-def _legs(
+def _moves(
     goals: Sequence[End | None], ends: Sequence[float], limits: Sequence[Limits]
-) -> list[Leg]:
-    """The parts between goals; a goal has to be within the limits of both segments that it ends."""
-    legs: list[Leg] = []
+) -> list[MoveToGoal]:
+    """From goal to goal; a goal has to be within the limits of the segments before and after it."""
+    moves: list[MoveToGoal] = []
     first, begin = 0, 0.0
     for i, (goal, end) in enumerate(zip(goals, ends, strict=True)):
         if goal is None:
@@ -145,6 +147,6 @@ def _legs(
         both = limits[i : i + 2]
         lower = np.max([each.lower[0] for each in both], axis=0)
         upper = np.min([each.upper[0] for each in both], axis=0)
-        legs.append(Leg(tuple(range(first, i + 1)), begin, end, goal, (lower, upper)))
+        moves.append(MoveToGoal(tuple(range(first, i + 1)), begin, end, goal, (lower, upper)))
         first, begin = i + 1, end
-    return legs
+    return moves

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, ParamSpec, Protocol, cast
 
 from hovi.checks.arguments import check_arguments_except
-from hovi.discrete.measures.segment_spans import SEGMENT_NAMES
+from hovi.discrete.measures.motion_segments import SEGMENT_NAMES
 from hovi.errors import InputError, expect
 from hovi.planning.problem.notation.ends import End as Start
 from hovi.planning.problem.notation.ends import as_end
@@ -112,29 +112,29 @@ def plan_sequence(
     chosen = PlanOptions() if options is None else options
     expect(chosen, PlanOptions, "hovi.PlanOptions(...), or its fields by keyword")
     chosen = chosen.with_changes(**changes)
-    parts = checked_segments(segments, chosen)
-    if len(parts) == 1:
-        return _alone(scene, start, parts[0], progress, chosen)
+    checked = checked_segments(segments, chosen)
+    if len(checked) == 1:
+        return _alone(scene, start, checked[0], progress, chosen)
     if chosen.objective == "time":
         raise InputError(
             'objective = "time" needs a free duration, and those of segments are fixed.'
         )
-    scene, begin, goals = _in_group(chosen.holding(scene), start, parts, chosen)
+    scene, begin, goals = _in_group(chosen.holding(scene), start, checked, chosen)
     scene = chosen.aiming(scene)
     deadline = Deadline(chosen.time_limit_seconds)
-    names = (f"the goal of {name!r}" for name in names_of(parts))
+    names = (f"the goal of {name!r}" for name in names_of(checked))
     stops = ends_of(begin, None, chosen.via) | dict(zip(names, goals, strict=True))
     chosen, apart = kept_apart(chosen.on(scene), scene.robot, stops)
-    job = job_of(scene, begin, goals, parts, chosen)
+    job = job_of(scene, begin, goals, checked, chosen)
     job.problem()  # raises for invalid input before the search
     warn_of_ends(scene.robot, job.start, job.goal, job.options)
     without = job.with_options(self_collision=False) if chosen.self_collision else None
-    scenes = [part.acting.on(job.scene) for part in job.parts]
+    scenes = [each.acting.on(job.scene) for each in job.segments]
     if fault := job.fault_of_time:
         solution = unresolved_at_once(job.problem(), job.options.guess, fault)
     else:
         solution = run(Search(job, deadline, progress or silent, None, without), began)
-    return _named(with_notes(solution, scenes, job.options, apart), parts)
+    return _named(with_notes(solution, scenes, job.options, apart), checked)
 
 
 def _alone(

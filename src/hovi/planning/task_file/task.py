@@ -89,10 +89,10 @@ class Task(Summarized):
         Raises InputError for an invalid sequence.
         """
         chosen = PlanOptions() if options is None else options
-        parts = checked_segments(segments, chosen)
-        goal = goals_of(parts, scene.robot)[-1]
+        checked = checked_segments(segments, chosen)
+        goal = goals_of(checked, scene.robot)[-1]
         assert goal is not None
-        return cls(scene, start, goal, duration_of(parts), chosen, name, parts)
+        return cls(scene, start, goal, duration_of(checked), chosen, name, checked)
 
     def __getattr__(self, name: str) -> Any:
         """An option by its own name, as tasks had it before: deprecated, use task.options."""

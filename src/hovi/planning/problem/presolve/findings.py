@@ -8,8 +8,8 @@ from hovi.planning.problem.contradictions import contradiction
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.limits import no_limits
 from hovi.planning.problem.presolve.end_torques import held_still_at
-from hovi.planning.problem.presolve.legs import Stop, frame_too_far
 from hovi.planning.problem.presolve.length_slips import length_slips
+from hovi.planning.problem.presolve.moves import Waypoint, frame_too_far
 from hovi.planning.problem.presolve.unit_slips import heavy_loads, long_durations
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.system.dataclass import dataclass
@@ -50,8 +50,12 @@ def about_limits(
     reason = "" if at_frame else contradiction(problem, limits)
     if reason or isinstance(goal, Periodic):
         return Findings(reason)
-    stops = [Stop("start", 0.0, start), *(_via(problem)), Stop("goal", problem.grid.duration, goal)]
-    short = frame_too_far(problem.robot, stops, limits)
+    waypoints = [
+        Waypoint("start", 0.0, start),
+        *(_via(problem)),
+        Waypoint("goal", problem.grid.duration, goal),
+    ]
+    short = frame_too_far(problem.robot, waypoints, limits)
     if short is not None and short.certain:
         return Findings(short.clause)
     if short is not None:
@@ -70,9 +74,11 @@ def about_limits(
     return Findings("", tuple(warnings))
 
 
-def _via(problem: TrajectoryProblem) -> list[Stop]:
-    stops = [Stop(f"via point at {via.time:g} s", via.time, via.goal) for via in problem.via]
-    return sorted(stops, key=lambda stop: stop.time)
+def _via(problem: TrajectoryProblem) -> list[Waypoint]:
+    waypoints = [
+        Waypoint(f"via point at {via.time:g} s", via.time, via.goal) for via in problem.via
+    ]
+    return sorted(waypoints, key=lambda waypoint: waypoint.time)
 
 
 def slips(problem: TrajectoryProblem) -> list[str]:

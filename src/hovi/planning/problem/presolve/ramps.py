@@ -19,7 +19,7 @@ import numpy.typing as npt
 from hovi.discrete.grid import Grid
 from hovi.discrete.state import State
 from hovi.planning.problem.presolve.least_time import NONE, Pace, fastest
-from hovi.planning.problem.presolve.legs import Leg, Stop
+from hovi.planning.problem.presolve.moves import Move, Waypoint
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.robot.space.coordinates import Coordinates
 
@@ -34,7 +34,8 @@ SMOOTH_GRADES = np.sort([*2.0 ** np.arange(-3, 12), 0.75, 0.875])
 CLOSE = 1e-6
 """Two nodes are one if they are nearer than this fraction of the duration."""
 NEAR = 0.1
-"""Nodes of two joints are one if they are nearer than this fraction of their time from the stop."""
+"""Nodes of two joints are one if they are nearer than this fraction of their distance in time from
+the waypoint."""
 ENDS = "start", "goal"
 """Names of the ends of a motion."""
 
@@ -49,64 +50,64 @@ def graded_to_ramps(problem: TrajectoryProblem) -> Grid:
         return grid
     nodes = np.zeros(0)
     grades = np.asarray(GRADES if problem.ld.k < 3 else SMOOTH_GRADES, dtype=float)
-    for leg in _legs(problem):
-        times = _ramp_nodes(leg, grades, float(grid.steps.max()))
-        nodes = np.union1d(nodes, leg.first.time + times)
+    for move in _moves(problem):
+        times = _ramp_nodes(move, grades, float(grid.steps.max()))
+        nodes = np.union1d(nodes, move.first.time + times)
     nodes = nodes[np.diff(nodes, prepend=-np.inf) > CLOSE * grid.duration]
     apart = np.abs(nodes[:, None] - grid.t).min(axis=1, initial=np.inf) > CLOSE * grid.duration
     return grid.split_at(np.union1d(grid.t, nodes[apart]))
 
 
-def _legs(problem: TrajectoryProblem) -> list[Leg]:
+def _moves(problem: TrajectoryProblem) -> list[Move]:
     """The parts of the motion between neighboring states, with the limits there."""
     limits, on, T = problem.limits, problem.coordinates, problem.grid.duration
     ends = [(ENDS[0], 0.0, problem.start), (ENDS[1], T, problem.goal)]
     given = [*ends, *(("via point", via.time, via.goal) for via in problem.via)]
-    stops = [Stop(name, t, x) for name, t, x in given if isinstance(x, State)]
+    waypoints = [Waypoint(name, t, x) for name, t, x in given if isinstance(x, State)]
     assert limits is not None
     return [
-        Leg(first, last, on, Pace.of(limits.until(last.time)), limits)
-        for first, last in pairwise(sorted(stops, key=lambda stop: stop.time))
+        Move(first, last, on, Pace.of(limits.until(last.time)), limits)
+        for first, last in pairwise(sorted(waypoints, key=lambda waypoint: waypoint.time))
     ]
 
 
-def _ramp_nodes(leg: Leg, grades: Array, longest: float) -> Array:
-    """Times of nodes in a leg, from its beginning on, in [s]; none where no joint is pressed.
+def _ramp_nodes(move: Move, grades: Array, longest: float) -> Array:
+    """Times of nodes in a move, from its beginning on, in [s]; none where no joint is pressed.
 
     longest: step of the grid, in [s].
     """
-    on, sides = leg.coordinates, [np.zeros(0), np.zeros(0)]
-    first, last = (_velocities(stop, on) for stop in (leg.first, leg.last))
-    for i, distance in enumerate(leg.distance):
-        for side, ramp in enumerate(_ramps(leg, i, float(distance), (first[i], last[i]))):
+    on, sides = move.coordinates, [np.zeros(0), np.zeros(0)]
+    first, last = (_velocities(waypoint, on) for waypoint in (move.first, move.last))
+    for i, distance in enumerate(move.distance):
+        for side, ramp in enumerate(_ramps(move, i, float(distance), (first[i], last[i]))):
             times = ramp * grades[(ramp * grades <= 2.0 * longest) | (grades <= 1.0)]
             known = sides[side]
             apart = np.abs(times[:, None] - known).min(axis=1, initial=np.inf) > NEAR * times
-            sides[side] = np.append(known, times[apart & (times < leg.time)])
-    return np.concatenate([sides[0], leg.time - sides[1]])
+            sides[side] = np.append(known, times[apart & (times < move.time)])
+    return np.concatenate([sides[0], move.time - sides[1]])
 
 
-def _velocities(stop: Stop, on: Coordinates) -> Array:
-    """Velocities of the joints at a stop, (nv,), in [rad/s] or [m/s]; NaN if free at an end.
+def _velocities(waypoint: Waypoint, on: Coordinates) -> Array:
+    """Velocities of the joints at a waypoint, (nv,), in [rad/s] or [m/s]; NaN if free at an end.
 
     Where a via point leaves a velocity free, the joint may turn round, with ramps as at rest.
     """
-    assert isinstance(stop.goal, State)
-    ends = stop.name in ENDS
-    free = stop.goal.free_on(on, stop.name)[1]
-    return np.where(free, np.nan if ends else 0.0, stop.goal.on(on, stop.name)[1])
+    assert isinstance(waypoint.goal, State)
+    ends = waypoint.name in ENDS
+    free = waypoint.goal.free_on(on, waypoint.name)[1]
+    return np.where(free, np.nan if ends else 0.0, waypoint.goal.on(on, waypoint.name)[1])
 
 
-def _ramps(leg: Leg, i: int, distance: float, velocities: tuple[float, float]) -> Array:
+def _ramps(move: Move, i: int, distance: float, velocities: tuple[float, float]) -> Array:
     """Longest times in which joint i speeds up and slows down, (2,), in [s]; 0 if not pressed.
 
     distance: of its travel, in [rad] or [m]. velocities: at the ends, NaN where free.
     """
-    pace = leg.pace
+    pace = move.pace
     speeds = float(pace.down[i]), float(pace.up[i])
     needed, peak = fastest(distance, velocities, speeds, float(pace.acceleration[i]))
-    if needed < TIGHT * leg.time:
+    if needed < TIGHT * move.time:
         return np.zeros(2)
     changes = np.nan_to_num(np.abs(peak - np.array(velocities)))
-    spare = max(abs(peak) * leg.time - np.sign(peak) * distance, 0.0)
+    spare = max(abs(peak) * move.time - np.sign(peak) * distance, 0.0)
     return np.asarray(2.0 * spare * changes / max(float(changes @ changes), NONE))

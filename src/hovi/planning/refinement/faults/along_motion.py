@@ -1,7 +1,7 @@
 """The cost along a motion with all narrow features of its effects, however few points a grid has.
 
-Time is split until the effects are bounded to change little in every part, see `Enclosure`, and
-Gauss points in the parts integrate the Lagrangian.
+Time is split until the effects are bounded to change little in every cell, see `Enclosure`, and
+Gauss points in the cells integrate the Lagrangian.
 """
 
 from __future__ import annotations
@@ -26,70 +26,70 @@ from hovi.system.dataclass import dataclass
 Index = npt.NDArray[np.intp]
 
 CHANGE = 1.0
-"""Largest change of the argument of a function in a part of time, as in exp(x) or sin(x)."""
-FIRST_PARTS = 4
-"""Least number of parts of an interval."""
-PIECES = 4
-"""Pieces into which a part is split. Most of the time is spent per instruction, not per part."""
+"""Largest change of the argument of a function in a cell of time, as in exp(x) or sin(x)."""
+FIRST_CELLS = 4
+"""Least number of cells of an interval."""
+SPLIT = 4
+"""Pieces into which a cell is split. Most of the time is spent per instruction, not per cell."""
 INSTANTS = 2000
 """Least number of instants at which a Lagrangian without bounds is looked at."""
-MAX_PARTS = 20_000
-"""Maximum number of parts of a motion."""
+MAX_CELLS = 20_000
+"""Maximum number of cells of a motion."""
 LEAST_SHARE = 2.0**-34
-"""Shortest part, relative to the duration."""
+"""Shortest cell, relative to the duration."""
 _RULES = [np.polynomial.legendre.leggauss(points) for points in (4, 6)]
 _S = np.concatenate([(x + 1) / 2 for x, _ in _RULES])
 """The points of both rules in [0, 1]."""
 
 
 @dataclass(frozen=True, eq=False)
-class Parts:
-    """Parts of intervals. interval: their numbers. begin, end: in [0, 1], all of shape (P,)."""
+class Cells:
+    """Cells of intervals. interval: their numbers. begin, end: in [0, 1], all of shape (P,)."""
 
     interval: Index
     begin: Array
     end: Array
 
     @classmethod
-    def of(cls, intervals: int, number: int) -> Parts:
-        """Equal parts of every interval."""
+    def of(cls, intervals: int, number: int) -> Cells:
+        """Equal cells of every interval."""
         k, s = np.repeat(np.arange(intervals), number), np.arange(number) / number
         return cls(k, np.tile(s, intervals), np.tile(s + 1 / number, intervals))
 
     def __len__(self) -> int:
         return len(self.begin)
 
-    def chosen(self, which: npt.NDArray[np.bool_] | Index) -> Parts:
+    def chosen(self, which: npt.NDArray[np.bool_] | Index) -> Cells:
         """Some of them."""
-        return Parts(self.interval[which], self.begin[which], self.end[which])
+        return Cells(self.interval[which], self.begin[which], self.end[which])
 
-    def split(self) -> Parts:
-        """PIECES equal pieces of each."""
-        s = np.arange(PIECES + 1) / PIECES
+    def split(self) -> Cells:
+        """SPLIT equal pieces of each."""
+        s = np.arange(SPLIT + 1) / SPLIT
         ends = self.begin[:, None] + (self.end - self.begin)[:, None] * s
-        k = np.repeat(self.interval, PIECES)
-        return Parts(k, ends[:, :-1].ravel(), ends[:, 1:].ravel())
+        k = np.repeat(self.interval, SPLIT)
+        return Cells(k, ends[:, :-1].ravel(), ends[:, 1:].ravel())
 
-    def joined(self, others: Parts) -> Parts:
+    def joined(self, others: Cells) -> Cells:
         """These and others."""
         pairs = zip(*((x.interval, x.begin, x.end) for x in (self, others)), strict=True)
         k, begin, end = (np.concatenate(pair) for pair in pairs)
-        return Parts(k, begin, end)
+        return Cells(k, begin, end)
 
 
 @dataclass(frozen=True, eq=False)
 class AlongMotion:
-    """The integral of a Lagrangian along a motion, in parts that resolve its effects.
+    """The integral of a Lagrangian along a motion, in cells that resolve its effects.
 
     cost: the integral. error: bound of what it may miss. by_interval: of the motion's grid, (N,).
-    parts: of time. fault: what no parts resolve, as a clause; "" if nothing.
+    cells: of time. fault: what no cells resolve, as a clause; "" if nothing.
     sampled: names of effects without bounds, which are looked at at INSTANTS instants.
     """
 
     cost: float
     error: float
     by_interval: Array
-    parts: Parts
+    cells: Cells
     fault: str
     sampled: tuple[str, ...] = ()
 
@@ -151,64 +151,64 @@ class _Look:
         """Split, then integrate."""
         N, sampled = self.motion.grid.intervals, tuple(x for s in self.seen for x in s.sampled)
         least = -(-INSTANTS // (len(_S) * N)) if sampled else 0
-        parts, unseen, _ = self._split(Parts.of(N, max(FIRST_PARTS, least)), self._deviation)
-        parts, error, values = self._split(parts, self._rule_error)
-        by_interval = np.bincount(parts.interval, values, minlength=N).astype(np.float64)
+        cells, unseen, _ = self._split(Cells.of(N, max(FIRST_CELLS, least)), self._deviation)
+        cells, error, values = self._split(cells, self._rule_error)
+        by_interval = np.bincount(cells.interval, values, minlength=N).astype(np.float64)
         cost = float(by_interval.sum())
-        return AlongMotion(cost, unseen + error, by_interval, parts, self.fault, sampled)
+        return AlongMotion(cost, unseen + error, by_interval, cells, self.fault, sampled)
 
     def _split(
-        self, parts: Parts, error_of: Callable[[Parts], tuple[Array, list[str], Array]]
-    ) -> tuple[Parts, float, Array]:
-        """Parts that are split until the sum of their errors is within the budget, and it.
+        self, cells: Cells, error_of: Callable[[Cells], tuple[Array, list[str], Array]]
+    ) -> tuple[Cells, float, Array]:
+        """Cells that are split until the sum of their errors is within the budget, and it.
 
-        error_of: errors, (P,), names of what causes them, and a number of each part, (P,),
+        error_of: errors, (P,), names of what causes them, and a number of each cell, (P,),
         which is returned, too.
         """
         grid, limit = self.motion.grid, LEAST_SHARE * self.motion.duration
-        errors, names, values = error_of(parts)
+        errors, names, values = error_of(cells)
         while errors.sum() > self.budget:
-            cut = errors > self.budget / (2 * len(parts))
-            steps = grid.steps[parts.interval] * (parts.end - parts.begin)
-            more_parts = (PIECES - 1) * np.count_nonzero(cut)
-            if steps[cut].min() < PIECES * limit or len(parts) + more_parts > MAX_PARTS:
+            cut = errors > self.budget / (2 * len(cells))
+            steps = grid.steps[cells.interval] * (cells.end - cells.begin)
+            more_cells = (SPLIT - 1) * np.count_nonzero(cut)
+            if steps[cut].min() < SPLIT * limit or len(cells) + more_cells > MAX_CELLS:
                 i = int(np.argmax(errors))
-                t = grid.t[parts.interval[i]] + parts.begin[i] * grid.steps[parts.interval[i]]
+                t = grid.t[cells.interval[i]] + cells.begin[i] * grid.steps[cells.interval[i]]
                 self.fault = (
                     self.fault or f"{names[i]} changes within {steps[i]:.2g} s at {t:.6g} s"
                 )
                 break
-            pieces = parts.chosen(cut).split()
-            more, of, others = error_of(pieces)
-            parts = parts.chosen(~cut).joined(pieces)
+            split = cells.chosen(cut).split()
+            more, of, others = error_of(split)
+            cells = cells.chosen(~cut).joined(split)
             errors, values = np.append(errors[~cut], more), np.append(values[~cut], others)
             names = [x for x, gone in zip(names, cut, strict=True) if not gone] + of
-        return parts, float(errors.sum()), values
+        return cells, float(errors.sum()), values
 
-    def _rule_error(self, parts: Parts) -> tuple[Array, list[str], Array]:
-        """The differences of two Gauss rules in each part, and the integrals."""
-        fewer, value = self._integrals(parts)
-        return np.abs(value - fewer), ["the cost"] * len(parts), value
+    def _rule_error(self, cells: Cells) -> tuple[Array, list[str], Array]:
+        """The differences of two Gauss rules in each cell, and the integrals."""
+        fewer, value = self._integrals(cells)
+        return np.abs(value - fewer), ["the cost"] * len(cells), value
 
-    def _integrals(self, parts: Parts) -> Array:
-        """The integral of L over each part by two rules, shape (2, P)."""
-        k, s = np.repeat(parts.interval, len(_S)), _inside(parts, _S)
+    def _integrals(self, cells: Cells) -> Array:
+        """The integral of L over each cell by two rules, shape (2, P)."""
+        k, s = np.repeat(cells.interval, len(_S)), _inside(cells, _S)
         jet = self.motion.jet_intervals(k, s, self.lagrangian.order)
         t = self.motion.t[k] + s * self.motion.grid.steps[k]
-        values = self.lagrangian.value(*jet, t=t).reshape(len(parts), -1)
-        steps = self.motion.grid.steps[parts.interval] * (parts.end - parts.begin)
+        values = self.lagrangian.value(*jet, t=t).reshape(len(cells), -1)
+        steps = self.motion.grid.steps[cells.interval] * (cells.end - cells.begin)
         fewer = len(_RULES[0][0])
         pairs = zip(_RULES, (values[:, :fewer], values[:, fewer:]), strict=True)
         return np.stack([steps * (x @ rule[1]) / 2 for rule, x in pairs])
 
-    def _deviation(self, parts: Parts) -> tuple[Array, list[str], Array]:
-        """How much of the cost the effects may hide in each part, at most, and which of them."""
-        errors, names = np.zeros(len(parts)), [""] * len(parts)
+    def _deviation(self, cells: Cells) -> tuple[Array, list[str], Array]:
+        """How much of the cost the effects may hide in each cell, at most, and which of them."""
+        errors, names = np.zeros(len(cells)), [""] * len(cells)
         for number, seen in enumerate(self.seen):
-            here = np.flatnonzero(self._segments[parts.interval] == number)
+            here = np.flatnonzero(self._segments[cells.interval] == number)
             if len(here) == 0 or not (seen.bounded or seen.base):
                 continue
-            found = self._of_scene(seen, parts.chosen(here))
+            found = self._of_scene(seen, cells.chosen(here))
             total = sum(each for _, each in found)
             largest = np.argmax([each for _, each in found], axis=0)
             errors[here] = total
@@ -222,17 +222,17 @@ class _Look:
             return self.lagrangian.segments_of(self.motion.t)
         return np.zeros(self.motion.grid.intervals, dtype=np.intp)
 
-    def _of_scene(self, seen: _Seen, parts: Parts) -> list[tuple[str, Array]]:
+    def _of_scene(self, seen: _Seen, cells: Cells) -> list[tuple[str, Array]]:
         """What each effect of a scene may hide, (P,) each, with its name."""
-        steps = self.motion.grid.steps[parts.interval] * (parts.end - parts.begin)
-        boxes, rates, tau = self._boxes(parts, steps)
+        steps = self.motion.grid.steps[cells.interval] * (cells.end - cells.begin)
+        boxes, rates, tau = self._boxes(cells, steps)
         found = []
         for effect, peaks in zip(seen.bounded, seen.peaks, strict=False):
             away = _deviations(effect, boxes, rates, steps, peaks)
             cost = self._cost_of_torque(tau, away) if effect.is_torque else away.sum(axis=1)
             found.append((effect.name, steps * cost))
-        for part, peaks in zip(seen.base, seen.peaks[len(seen.bounded) :], strict=True):
-            found.append((part.name, self._of_base(part, peaks, parts, steps)))
+        for term, peaks in zip(seen.base, seen.peaks[len(seen.bounded) :], strict=True):
+            found.append((term.name, self._of_base(term, peaks, cells, steps)))
         return found
 
     def _cost_of_torque(self, tau: Array, away: Array) -> Array:
@@ -242,19 +242,19 @@ class _Look:
             products = np.where(away == 0, 0.0, (tau + away) * away)
         return np.asarray(products @ R)
 
-    def _of_base(self, part: TimePart, peaks: Array, parts: Parts, steps: Array) -> Array:
-        """The share of the cost that a part of the base's motion may hide: that in its square."""
-        begin = self.motion.t[parts.interval] + parts.begin * self.motion.grid.steps[parts.interval]
-        away, size = part.deviation(begin, begin + steps, peaks)
-        whole = self.squares.setdefault(id(part), float(np.sum(size**2 * steps)))
+    def _of_base(self, term: TimePart, peaks: Array, cells: Cells, steps: Array) -> Array:
+        """The share of the cost that a cell of the base's motion may hide: that in its square."""
+        begin = self.motion.t[cells.interval] + cells.begin * self.motion.grid.steps[cells.interval]
+        away, size = term.deviation(begin, begin + steps, peaks)
+        whole = self.squares.setdefault(id(term), float(np.sum(size**2 * steps)))
         return self.cost * 2.0 * away * size * steps / max(whole, 1e-300)
 
-    def _boxes(self, parts: Parts, steps: Array) -> tuple[list[Bound], list[Bound], Array]:
-        """Bounds of (q, v, a, tau, t) in each part, of (da/dt, dtau/dt), and the largest |tau|."""
-        k, s = np.repeat(parts.interval, 3), _inside(parts, np.array([0.0, 0.5, 1.0]))
+    def _boxes(self, cells: Cells, steps: Array) -> tuple[list[Bound], list[Bound], Array]:
+        """Bounds of (q, v, a, tau, t) in each cell, of (da/dt, dtau/dt), and the largest |tau|."""
+        k, s = np.repeat(cells.interval, 3), _inside(cells, np.array([0.0, 0.5, 1.0]))
         sample = self.motion.sample_intervals(k, s)
         t = self.motion.t[k] + s * self.motion.grid.steps[k]
-        triples = [x.reshape(len(parts), 3, -1) for x in (*sample, t)]
+        triples = [x.reshape(len(cells), 3, -1) for x in (*sample, t)]
         changes = [2.0 * np.diff(triples[i], axis=1) / steps[:, None, None] for i in (2, 3)]
         tau = np.abs(triples[3]).max(axis=1)
         return [_between(x) for x in triples], [_slopes(x) for x in changes], tau
@@ -263,7 +263,7 @@ class _Look:
 def _deviations(
     effect: EffectBounds, boxes: list[Bound], rates: list[Bound], steps: Array, peaks: Array
 ) -> Array:
-    """How far an effect may be from a line in each part, shape (P, m); 0 where it is calm."""
+    """How far an effect may be from a line in each cell, shape (P, m); 0 where it is calm."""
     bounds = effect.value(boxes, CHANGE, peaks)
     away, wild = np.zeros_like(bounds.lower), ~bounds.calm
     if wild.any():
@@ -273,9 +273,9 @@ def _deviations(
     return away
 
 
-def _inside(parts: Parts, s: Array) -> Array:
-    """Positions s in [0, 1] of each part, as those of its interval, one part after the other."""
-    positions = parts.begin[:, None] + (parts.end - parts.begin)[:, None] * s
+def _inside(cells: Cells, s: Array) -> Array:
+    """Positions s in [0, 1] of each cell, as those of its interval, one cell after the other."""
+    positions = cells.begin[:, None] + (cells.end - cells.begin)[:, None] * s
     return np.clip(positions, 0.0, 1.0).ravel()
 
 

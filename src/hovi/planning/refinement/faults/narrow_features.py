@@ -65,11 +65,11 @@ class Features:
 
     def seen_by(self, grid: Grid) -> Grid:
         """The motion's grid with nodes where its points miss something."""
-        parts, N = self.along.parts, grid.intervals
+        cells, N = self.along.cells, grid.intervals
         missed = np.abs(self.along.by_interval - self.by_interval)
         here = missed > self.allowed * self.size / N
-        begin = grid.t[parts.interval] + parts.begin * grid.steps[parts.interval]
-        inside = begin[here[parts.interval] & (parts.begin > 0)]
+        begin = grid.t[cells.interval] + cells.begin * grid.steps[cells.interval]
+        inside = begin[here[cells.interval] & (cells.begin > 0)]
         return grid.split_at(np.sort(np.concatenate([grid.t, inside])))
 
     @property

@@ -20,7 +20,7 @@ from hovi.planning.solver.central_path import CentralPath
 from hovi.planning.solver.limits.limit_rows import LimitRows
 from hovi.planning.solver.methods.bounded_search import Bounded, BoundedSearch
 from hovi.planning.solver.methods.method import Guess
-from hovi.planning.solver.methods.motion_legs import Leg, joined, legs_of
+from hovi.planning.solver.methods.subproblems import Subproblem, joined, subproblems_of
 from hovi.planning.solver.multipliers import Multipliers
 from hovi.planning.solver.near.clearance_rows import ClearanceRows
 from hovi.planning.solver.near.push_out import pushed_out
@@ -47,11 +47,11 @@ ROUGH_TOLERANCE = 1e-4
 """Residual of conditions at nodes at which it ends, in [rad] or [m]."""
 ROUGH_ROUNDS = 3
 """Rounds of an augmented Lagrangian for a rough motion."""
-LEG_LEVELS = 3e-4, 1e-2
-"""Barrier parameters at which the legs of a motion are joined, relative to the cost's mean density,
-the second where the first one fails: small enough that each stays where it is, and large enough for
-the accelerations at the seams."""
-LEG_AHEAD = 0.005
+SUBPROBLEM_LEVELS = 3e-4, 1e-2
+"""Barrier parameters at which the subproblems of a motion are joined, relative to the cost's mean
+density, the second where the first one fails: small enough that each stays where it is, and large
+enough for the accelerations at the seams."""
+SUBPROBLEM_AHEAD = 0.005
 """Distance beyond the least one up to which pairs get rows then, in [m]."""
 DETOUR = 1.05
 """Cost of a rough motion, relative to that of one without distances, above which it is one."""
@@ -61,17 +61,17 @@ def cleared_motion(search: BoundedSearch, guess: DiscretePath) -> Bounded:
     """A motion within limits that keeps its distances, from a guess that may keep neither.
 
     It is solved without distances, until it can be seen whether it keeps them. If it does not, a
-    motion with seams is solved leg by leg, and then as a whole. Without legs, or where that fails,
-    it is moved out of the obstacles, and so is the guess if that takes a detour. The better rough
-    motion, by bounds and then by cost, is solved to its end; the other where that diverges.
+    motion with seams is solved in subproblems, and then as a whole. Without them, or where that
+    fails, it is moved out of the obstacles, and so is the guess if that takes a detour. The better
+    rough motion, by bounds and then by cost, is solved to its end; the other where that diverges.
     """
     assert search.near is not None
     free = _without_distances(search, guess)
     if not search.near.blocked and free.why is not Reason.DIVERGED:
         return free
-    by_legs = _by_legs(search, guess)
-    if by_legs is not None:
-        return by_legs
+    by_subproblems = _by_subproblems(search, guess)
+    if by_subproblems is not None:
+        return by_subproblems
     rough = [_rough_with_distances(search, free.x)]
     if rough[0] is None or rough[0].rank > (False, DETOUR * abs(free.outputs.value)):
         steps = ROUGH_STEPS
@@ -86,13 +86,13 @@ def cleared_motion(search: BoundedSearch, guess: DiscretePath) -> Bounded:
     return dataclasses.replace(free, why=Reason.DIVERGED)
 
 
-def _by_legs(search: BoundedSearch, guess: DiscretePath) -> Bounded | None:
-    """The solution from those of the legs between seams; None without legs, or where that fails."""
-    legs = legs_of(search.problem)
+def _by_subproblems(search: BoundedSearch, guess: DiscretePath) -> Bounded | None:
+    """The solution from those of the subproblems; None without them, or where that fails."""
+    subproblems = subproblems_of(search.problem)
     parts = list[BoundedSearch]()
     known = list[CentralPath]()
-    for leg in legs:
-        part = _search_of(leg, search, guess)
+    for subproblem in subproblems:
+        part = _search_of(subproblem, search, guess)
         ended = cleared_motion(part, part.guess)
         search.iterations += part.iterations
         search.history += part.history
@@ -100,34 +100,38 @@ def _by_legs(search: BoundedSearch, guess: DiscretePath) -> Bounded | None:
             return None
         parts.append(part)
         known.append(part.central_path(ended))
-    for level in LEG_LEVELS if legs else ():
-        path = joined(legs, [each.at(level)[1] for each in known])
-        ended = _from_legs(search, legs, parts, path, level)
+    for level in SUBPROBLEM_LEVELS if subproblems else ():
+        path = joined(subproblems, [each.at(level)[1] for each in known])
+        ended = _from_subproblems(search, subproblems, parts, path, level)
         if ended.settled:
             return ended
     return None
 
 
-def _search_of(leg: Leg, search: BoundedSearch, guess: DiscretePath) -> BoundedSearch:
-    """The search of a leg. guess: of the whole motion."""
-    problem, criteria = leg.problem, search.remaining_criteria()
-    start: Guess = Start(leg.path(guess))
+def _search_of(subproblem: Subproblem, search: BoundedSearch, guess: DiscretePath) -> BoundedSearch:
+    """The search of a subproblem. guess: of the whole motion."""
+    problem, criteria = subproblem.problem, search.remaining_criteria()
+    start: Guess = Start(subproblem.path(guess))
     limits = problem.limits or no_limits(problem.coordinates)
     return BoundedSearch(problem, limits, criteria, search.report, start, lazy=True)
 
 
-def _from_legs(
+def _from_subproblems(
     search: BoundedSearch,
-    legs: Sequence[Leg],
+    subproblems: Sequence[Subproblem],
     parts: Sequence[BoundedSearch],
     path: DiscretePath,
     level: float,
 ) -> Bounded:
-    """The solve of the whole from its legs' paths at a level, with their rows of distances."""
-    near = [(leg.first, each.near) for leg, each in zip(legs, parts, strict=True) if each.near]
+    """The solve of the whole from the joined path at a level, with the subproblems' distances."""
+    near = [
+        (subproblem.first, each.near)
+        for subproblem, each in zip(subproblems, parts, strict=True)
+        if each.near
+    ]
     search.rows, search.near = search.coarse_rows(), search.no_near_rows()
     search.near.take(near)
-    search.near.extend(search.problem, path, LEG_AHEAD)
+    search.near.extend(search.problem, path, SUBPROBLEM_AHEAD)
     return search.solve_at_level(path, level)
 
 

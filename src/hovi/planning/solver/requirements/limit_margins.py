@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.checks.arguments import check_arguments
-from hovi.discrete.measures.segment_spans import segment_spans
+from hovi.discrete.measures.motion_segments import motion_segments
 from hovi.discrete.trajectory import Trajectory
 from hovi.planning.problem.limit_violation import AT_LIMIT, excess_along
 from hovi.planning.problem.limits import KINDS, Limits
@@ -87,16 +87,16 @@ def limit_margins(
         return None, {}
     excess, names = excess_along(motion, limits), motion.coordinate_names
     margin = -np.maximum(excess.lower, excess.upper)  # (N, kinds, nv)
-    spans = segment_spans(motion)
-    if not limits.parts or len(spans) != len(limits.parts):
+    segments = motion_segments(motion)
+    if not limits.parts or len(segments) != len(limits.parts):
         found = {
-            span.name: LimitMargins(names, margin[span.intervals].min(axis=0), limits)
-            for span in spans
+            segment.name: LimitMargins(names, margin[segment.intervals].min(axis=0), limits)
+            for segment in segments
         }
         return LimitMargins(names, margin.min(axis=0), limits), found
     of_parts = {}
-    for span, part in zip(spans, limits.parts, strict=True):
-        own = margin[span.intervals].min(axis=0) * (limits.ranges / part.ranges)
-        of_parts[span.name] = LimitMargins(names, own, part)
+    for segment, part in zip(segments, limits.parts, strict=True):
+        own = margin[segment.intervals].min(axis=0) * (limits.ranges / part.ranges)
+        of_parts[segment.name] = LimitMargins(names, own, part)
     tightest = np.min([each.margin for each in of_parts.values()], axis=0)
     return LimitMargins(names, tightest, limits), of_parts

@@ -1,4 +1,4 @@
-"""Durations that are too short: lower bounds of the time between what a motion has to meet.
+"""Durations that are too short: lower bounds of the time between waypoints.
 
 Between two states the bound is that of the slowest joint. From a state to a frame at its goal the
 joints have to be within what they travel in the time: if inverse kinematics finds no configuration
@@ -38,8 +38,8 @@ BISECTIONS = 6
 
 
 @dataclass(frozen=True, eq=False)
-class Stop:
-    """What a motion meets at a time, in [s]. name: in messages, such as "goal"."""
+class Waypoint:
+    """A start, goal or via point at a time, in [s]. name: in messages, such as "goal"."""
 
     name: str
     time: float
@@ -71,33 +71,35 @@ class Finding:
     certain: bool
 
 
-def states_too_far_apart(coordinates: Coordinates, stops: Sequence[Stop], limits: Limits) -> str:
+def states_too_far_apart(
+    coordinates: Coordinates, waypoints: Sequence[Waypoint], limits: Limits
+) -> str:
     """Which joint cannot travel between two of the states in time, as a clause; "" if all can.
 
-    stops: by ascending time; those at frames are left out.
+    waypoints: by ascending time; those at frames are left out.
     """
     if limits.parts or not limits.bounded[1:3].any():
         return ""
     pace = Pace.of(limits)
-    states = [stop for stop in stops if isinstance(stop.goal, State)]
+    states = [waypoint for waypoint in waypoints if isinstance(waypoint.goal, State)]
     for first, last in combinations(states, 2):
-        clause = _between_states(Leg(first, last, coordinates, pace, limits))
+        clause = _between_states(Move(first, last, coordinates, pace, limits))
         if clause:
             return clause
     return ""
 
 
-def frame_too_far(robot: Robot, stops: Sequence[Stop], limits: Limits) -> Finding | None:
+def frame_too_far(robot: Robot, waypoints: Sequence[Waypoint], limits: Limits) -> Finding | None:
     """The frame that is too far from one of the states, a certain finding if there is one.
 
-    stops: by ascending time. Legs between two frames are not looked at.
+    waypoints: by ascending time. Moves between two frames are not looked at.
     """
     if limits.parts or not limits.bounded[1:3].any():
         return None
     pace, unsure = Pace.of(limits), None
-    for first, last in combinations(stops, 2):
+    for first, last in combinations(waypoints, 2):
         if isinstance(first.goal, State) != isinstance(last.goal, State):
-            found = _FrameLeg(first, last, robot, pace, limits).finding()
+            found = _FrameMove(first, last, robot, pace, limits).finding()
             if found is not None and found.certain:
                 return found
             unsure = unsure or found
@@ -105,24 +107,24 @@ def frame_too_far(robot: Robot, stops: Sequence[Stop], limits: Limits) -> Findin
 
 
 @dataclass(frozen=True, eq=False)
-class Leg:
-    """A part of a motion between two stops."""
+class Move:
+    """The motion from one waypoint to a later one, whatever is between them."""
 
-    first: Stop
-    last: Stop
+    first: Waypoint
+    last: Waypoint
     coordinates: Coordinates
     pace: Pace
     limits: Limits
 
     @property
     def time(self) -> float:
-        """The time between the stops, in [s]."""
+        """The time between the waypoints, in [s]."""
         return self.last.time - self.first.time
 
     @property
     def rests(self) -> Rests:
-        """Number of stops at which each joint rests, (nv,)."""
-        first, last = (stop.rests(self.coordinates) for stop in (self.first, self.last))
+        """Number of waypoints at which each joint rests, (nv,)."""
+        first, last = (waypoint.rests(self.coordinates) for waypoint in (self.first, self.last))
         return first.astype(np.intp) + last
 
     @property
@@ -149,40 +151,40 @@ class Leg:
         return (self.first.name, self.last.name) == ("start", "goal")
 
 
-def _between_states(leg: Leg) -> str:
+def _between_states(move: Move) -> str:
     """The joint that cannot travel its distance in time."""
-    on, distance, needed = leg.coordinates, leg.distance, leg.needed
+    on, distance, needed = move.coordinates, move.distance, move.needed
     i = int(np.argmax(needed))
-    if needed[i] <= leg.time:
+    if needed[i] <= move.time:
         return ""
     units, kinds = on.coordinate_units[i], []
     for row, kind in ((1, "velocity"), (2, "acceleration")):
-        if leg.limits.bounded[row, i] and (row == 1 or leg.rests[i]):
-            most = leg.limits.upper[row, i] if distance[i] >= 0 else -leg.limits.lower[row, i]
+        if move.limits.bounded[row, i] and (row == 1 or move.rests[i]):
+            most = move.limits.upper[row, i] if distance[i] >= 0 else -move.limits.lower[row, i]
             kinds.append((kind, f"{kind} limit of {most:.4g} {units[row]}"))
-    what = "duration" if leg.whole else "time"
-    between = "" if leg.whole else f" from the {leg.first.name} to the {leg.last.name}"
+    what = "duration" if move.whole else "time"
+    between = "" if move.whole else f" from the {move.first.name} to the {move.last.name}"
     return (
         f"joint {on.coordinate_names[i]!r} has to move by {abs(distance[i]):.4g} {units.q}"
         f"{between}, which takes {needed[i]:.4g} s at its "
-        f"{' and '.join(text for _, text in kinds)}, longer than the {what} of {leg.time:.4g} s; "
+        f"{' and '.join(text for _, text in kinds)}, longer than the {what} of {move.time:.4g} s; "
         f"increase the {what} or the {' or '.join(kind for kind, _ in kinds)} limit"
     )
 
 
 @dataclass(frozen=True, eq=False)
-class _FrameLeg(Leg):
+class _FrameMove(Move):
     """A part of a motion between a state and a frame at its goal."""
 
     coordinates: Robot
 
     @property
-    def known(self) -> Stop:
-        """The stop that is a state."""
+    def known(self) -> Waypoint:
+        """The waypoint that is a state."""
         return self.first if isinstance(self.first.goal, State) else self.last
 
     @property
-    def _other(self) -> Stop:
+    def _other(self) -> Waypoint:
         return self.last if self.known is self.first else self.first
 
     def finding(self) -> Finding | None:
@@ -252,6 +254,6 @@ class _FrameLeg(Leg):
         return np.maximum(lower, near - down), np.minimum(upper, near + up)
 
     def _travel(self, time: float) -> tuple[Array, Array]:
-        """How far down and up the other stop's joints are at most from the known one's, (nv,)."""
+        """How far below and above the known waypoint the joints may be at the other one, (nv,)."""
         down, up = self.pace.travel(time, self.rests)
         return (down, up) if self.known is self.first else (up, down)

@@ -1,8 +1,8 @@
-"""Legs, motions from seam to seam: where q and v are given, little joins what is before and after.
+"""Subproblems: a motion in segments, divided at the seams at which q and v are given.
 
-For Lagrangians of order 2 the action and all bounds are then a sum over the legs between such
-seams, which are independent of each other; for order 3 the accelerations at the seams join them,
-and at goals of frames the configurations do, which legs take as those of the guess.
+For Lagrangians of order 2 the action and all bounds are sums over these subproblems, which are
+independent of each other. For order 3 the accelerations at the seams couple them, and so do the
+configurations at goals of frames, for which a subproblem takes those of the guess.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Leg:
+class Subproblem:
     """The part of a motion between two nodes, as a problem of its own.
 
     first, last: its nodes in the whole. problem: with its time from 0.
@@ -48,8 +48,8 @@ class Leg:
         return self.problem.moved(part)
 
 
-def legs_of(problem: TrajectoryProblem) -> list[Leg]:
-    """The legs between seams whose velocities are given; none where the motion has no such parts.
+def subproblems_of(problem: TrajectoryProblem) -> list[Subproblem]:
+    """The subproblems between seams whose velocities are given; none where there are no such seams.
 
     From one seam's configuration, or that of the guess where a frame has a goal, to the next one's;
     for order 3 without acceleration there.
@@ -57,17 +57,17 @@ def legs_of(problem: TrajectoryProblem) -> list[Leg]:
     distances, of = problem.distances, problem.ld.lagrangian
     held = {each.node: each for each in problem.holds if each.fixed[1].all()}
     asked = problem.conditions
-    timed = any(each.timed for each in _parts(of)) or any(each.timed for each in asked)
+    timed = any(each.timed for each in _segments_of(of)) or any(each.timed for each in asked)
     timed = timed or bool(times_of(asked))
     moving = distances is not None and bool(distances.paths)
     if not held or timed or moving or isinstance(problem.goal, Periodic):
         return []
     nodes = [0, *sorted(held), problem.grid.intervals]
-    return [Leg(a, b, _between(problem, held, a, b)) for a, b in pairwise(nodes)]
+    return [Subproblem(a, b, _between(problem, held, a, b)) for a, b in pairwise(nodes)]
 
 
-def joined(legs: Sequence[Leg], paths: Sequence[DiscretePath]) -> DiscretePath:
-    """The paths of all legs, one after the other."""
+def joined(subproblems: Sequence[Subproblem], paths: Sequence[DiscretePath]) -> DiscretePath:
+    """The paths of all subproblems, one after the other."""
     modes = max(path.inner.shape[1] for path in paths)
     inner = [np.pad(x.inner, ((0, 0), (0, modes - x.inner.shape[1]), (0, 0))) for x in paths]
 
@@ -100,7 +100,7 @@ def _between(
     return TrajectoryProblem(ld, start, goal, limits, via, problem.clearance, conditions=asked)
 
 
-def _parts(of: Lagrangian) -> Sequence[Lagrangian]:
+def _segments_of(of: Lagrangian) -> Sequence[Lagrangian]:
     return of.lagrangians if isinstance(of, SegmentedLagrangian) else (of,)
 
 

@@ -10,9 +10,9 @@ import pytest
 import hovi
 from hovi.planning.problem.limits import Limits, as_limits
 from hovi.planning.problem.presolve.least_time import Pace
-from hovi.planning.problem.presolve.legs import (
+from hovi.planning.problem.presolve.moves import (
     Finding,
-    Stop,
+    Waypoint,
     frame_too_far,
     states_too_far_apart,
 )
@@ -21,7 +21,9 @@ ARMS = {"ur5": "tool0", "panda": "panda_hand_tcp", "xarm7": "link_eef"}
 
 
 def found(robot: hovi.Robot, start: Any, goal: Any, time: float, limits: Limits) -> Finding | None:
-    return frame_too_far(robot, [Stop("start", 0.0, start), Stop("goal", time, goal)], limits)
+    return frame_too_far(
+        robot, [Waypoint("start", 0.0, start), Waypoint("goal", time, goal)], limits
+    )
 
 
 @pytest.mark.parametrize("name", ["ur5", "panda"])
@@ -66,10 +68,10 @@ def test_a_leg_to_or_from_a_via_point_is_named_once_by_its_two_ends(ur5: hovi.Ro
     frame, via = hovi.FrameGoal("tool0", ur5.frame_pose("tool0", q0)), "via point at 0.1 s"
     far = hovi.State(q1)
     for first, last in (
-        (Stop("start", 0.0, far), Stop(via, 0.1, frame)),
-        (Stop("start", 0.0, frame), Stop(via, 0.1, far)),
-        (Stop(via, 0.1, far), Stop("goal", 0.2, frame)),
-        (Stop(via, 0.1, frame), Stop("goal", 0.2, far)),
+        (Waypoint("start", 0.0, far), Waypoint(via, 0.1, frame)),
+        (Waypoint("start", 0.0, frame), Waypoint(via, 0.1, far)),
+        (Waypoint(via, 0.1, far), Waypoint("goal", 0.2, frame)),
+        (Waypoint(via, 0.1, frame), Waypoint("goal", 0.2, far)),
     ):
         finding = frame_too_far(ur5, [first, last], limits)
         assert finding is not None
@@ -130,8 +132,8 @@ def test_only_ends_at_rest_take_time_to_accelerate(two_link: hovi.Robot) -> None
     moving, free = hovi.State(q1, [3.0, 3.0]), hovi.State(q1, free_velocity="all")
 
     def is_short(time: float, start: Any, goal: Any, name: str = "goal") -> bool:
-        stops = [Stop("start", 0.0, start), Stop(name, time, goal)]
-        return bool(states_too_far_apart(two_link, stops, limits))
+        waypoints = [Waypoint("start", 0.0, start), Waypoint(name, time, goal)]
+        return bool(states_too_far_apart(two_link, waypoints, limits))
 
     rest, via = hovi.State(q0), "via point at 1 s"
     assert [is_short(t, rest, hovi.State(q1)) for t in (1.41, 1.42)] == [True, False]

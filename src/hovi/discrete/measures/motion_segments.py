@@ -12,7 +12,7 @@ SEGMENT_NAMES = "segment_names"
 """Key of the segments' names in the metadata of a motion."""
 
 
-class SegmentSpan(NamedTuple):
+class MotionSegment(NamedTuple):
     """A segment of a motion.
 
     begin, end: in [s]. intervals: its own, of those of the motion.
@@ -24,7 +24,7 @@ class SegmentSpan(NamedTuple):
     intervals: slice
 
 
-def segment_spans(trajectory: Trajectory) -> list[SegmentSpan]:
+def motion_segments(trajectory: Trajectory) -> list[MotionSegment]:
     """The segments of a motion, in order of time; none for a motion in one scene.
 
     Names may come from a file: if they do not fit the segments they are numbered instead.
@@ -38,6 +38,6 @@ def segment_spans(trajectory: Trajectory) -> list[SegmentSpan]:
         names = [f"segment {number}" for number in range(1, len(nodes))]
     t = trajectory.t
     return [
-        SegmentSpan(name, float(t[a]), float(t[b]), slice(a, b))
+        MotionSegment(name, float(t[a]), float(t[b]), slice(a, b))
         for name, a, b in zip(names, nodes[:-1], nodes[1:], strict=True)
     ]
