@@ -239,6 +239,7 @@ for line in sys.stdin:
             continue
         print(json.dumps({"begin": [name]}), flush=True)
         if name == "crashes":
+            print("out of breath", file=sys.stderr, flush=True)
             os._exit(3)
         if name == "endless":
             os.kill(os.getpid(), 24)
@@ -258,7 +259,7 @@ def test_a_problem_in_which_its_process_dies_does_not_end_the_others(
         for _ in range(2):
             found = worker.run({"names": names, "limit": 1.0}, 0, {})
             assert [found[name]["success"] for name in names] == [True, False, False, True]
-            assert found["crashes"]["status"] == "crash (3)"
+            assert found["crashes"]["status"] == "crash (3): out of breath"
             assert found["endless"]["status"] == "time-out"
     finally:
         worker.close()

@@ -143,7 +143,9 @@ class Worker:
         process = self._process
         code = 0 if process is None else process.wait()
         self.close()
-        return "time-out" if -code in (signal.SIGXCPU, signal.SIGKILL) else f"crash ({code})"
+        if -code in (signal.SIGXCPU, signal.SIGKILL):
+            return "time-out"
+        return f"crash ({code}): {self.failure()}"
 
     def failure(self) -> str:
         """The last line that the process wrote before it died."""
@@ -312,9 +314,7 @@ def relative_time(row: Row) -> float | None:
     return max(float(row["seconds"] / row["kernel"]), LEAST_TIME)
 
 
-def measured(
-    lanes: list[Lane], groups: list[dict[str, Any]], into: Measurement, of: int | None = None
-) -> None:
+def measured(lanes: list[Lane], groups: list[dict[str, Any]], into: Measurement) -> None:
     """Run groups on all lanes."""
     free: queue.Queue[Lane] = queue.Queue()
     for lane in lanes:
