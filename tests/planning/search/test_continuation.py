@@ -187,3 +187,16 @@ def test_problems_that_fail_before_any_step_are_not_continued(arm_scene: Scene) 
     assert "ontinuation" not in found.message
     assert reports.continued == []
     assert np.isfinite(found.cost)
+
+
+@pytest.mark.filterwarnings("ignore:invalid value encountered in matmul")
+def test_a_guess_of_infinite_cost_is_not_continued(two_link: hovi.Robot) -> None:
+    """Nor would easier problems have a finite cost there."""
+    steep = hovi.effects.RunningCost({"steep": 'exp(1e3*(q["shoulder"] + 1))'})
+    reports, grid = Reports(), GRID | {"intervals": 8}
+    scene = Scene(two_link, [Gravity(9.8), steep])
+    found = plan(scene, HANG, REACH_Q, 1.0, progress=reports, **grid)
+    assert (found.status, found.nit) == (Status.DIVERGED, 0)
+    assert "the cost is inf at t =" in found.message
+    assert "ontinuation" not in found.message
+    assert reports.continued == []
