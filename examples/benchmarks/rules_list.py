@@ -129,7 +129,7 @@ _rule(
     "parabola after a failure",
     "After a refused step the radius is that of the least value of a parabola along it.",
     "next_radius",
-    "max(0.25, share)",
+    "max(0.25, fraction)",
     "0.25",
 )
 _rule(
@@ -195,7 +195,7 @@ _rule(
     "corrected steps within the radius",
     "A corrected step beyond 1.5 radii is replaced by a plain one.",
     "BoundedSteps.step",
-    "step.share * step.trial.norm <= MAX_STRETCH * self.radius",
+    "step.fraction * step.trial.norm <= MAX_STRETCH * self.radius",
     "True",
 )
 _rule(
@@ -208,8 +208,8 @@ _rule(
 _rule(
     "multipliers follow cut steps in part",
     "A step cut to less than a tenth takes a part of the change of the equations' multipliers.",
-    "_reaction_share",
-    "min(1.0, share / FULL_REACTION_SHARE)",
+    "_reaction_fraction",
+    "min(1.0, fraction / FULL_REACTION_FRACTION)",
     "1.0",
 )
 _rule(
@@ -237,7 +237,7 @@ _rule(
     "last mu by the present cost",
     "The last barrier parameter falls with the cost where the guess cost far more.",
     "BoundedSteps.final_mu",
-    "min(max(share, LEAST_DENSITY), 1.0)",
+    "min(max(fraction, LEAST_DENSITY), 1.0)",
     "1.0",
 )
 _rule(
@@ -273,7 +273,7 @@ _rule(
     "end after a short step",
     "A cut step ends a solve if it predicts 1e-4 of what is enough for a whole one.",
     "_Iteration._finished",
-    "step.remaining <= SHORT_STEP_SHARE * enough",
+    "step.remaining <= SHORT_STEP_FRACTION * enough",
     "False",
 )
 _rule(
@@ -447,7 +447,7 @@ _rule(
     "second-order corrections",
     "A whole step that does not halve the residual is corrected by it.",
     "_Search._search_along",
-    "share == 1.0 and size >= 0.5 * self.size and math.isfinite(size)",
+    "fraction == 1.0 and size >= 0.5 * self.size and math.isfinite(size)",
     "False",
 )
 _rule(
@@ -475,7 +475,7 @@ _rule(
     "decrease decides where equations hold",
     "Where the residual is small, a step has to decrease the cost by Armijo's rule.",
     "_Search._accepted",
-    "share * min(-slope, LARGE_SLOPE) ** 2.3 > before**1.1",
+    "fraction * min(-slope, LARGE_SLOPE) ** 2.3 > before**1.1",
     "False",
 )
 _rule(
@@ -490,7 +490,7 @@ _rule(
     "large penalty for a warm guess",
     "A guess that nearly has no passive torque begins with a thousandfold penalty.",
     "first_multipliers",
-    "share <= WARM_TORQUE_SHARE",
+    "fraction <= WARM_TORQUE_FRACTION",
     "False",
 )
 _rule(
@@ -912,7 +912,7 @@ _rule(
     "rounded shapes",
     "Shapes are rounded the more, the farther a pair is from its bound.",
     "_rounding_of",
-    "np.clip(ROUNDED_SHARE * DISTANCE_SCALE * y, LEAST_ROUNDING, MOST_ROUNDING)",
+    "np.clip(ROUNDED_FRACTION * DISTANCE_SCALE * y, LEAST_ROUNDING, MOST_ROUNDING)",
     "np.full(np.shape(y), LEAST_ROUNDING)",
 )
 _at("distances", "planning.solver.near.cleared_action")

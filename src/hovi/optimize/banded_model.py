@@ -70,7 +70,7 @@ class BandLayout:
         last row that it or an earlier panel reaches, shape (panels,).
     runs: which entries of the intervals' Hessians enter the band, and where.
     scales: column = scale * unknown, shape (N, m), so that adjacent intervals of different length
-        share an unknown; None where every scale is one.
+        fraction an unknown; None where every scale is one.
     """
 
     unknowns: Index

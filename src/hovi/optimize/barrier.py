@@ -18,7 +18,7 @@ Pair = tuple[Array, Array]
 INITIAL_MARGIN = 1e-2
 """Minimum distance of an initial slack from its bounds, relative to the range."""
 MOST_MARGIN = 0.25
-"""The largest margin, as a share of the distance of the bounds."""
+"""The largest margin, as a fraction of the distance of the bounds."""
 WARM_START_MARGIN = 1e-5
 """Minimum distance of the slack of a warm start, unless it says otherwise."""
 ADDED_MARGIN = 0.3
@@ -28,7 +28,7 @@ LEAST_GAP = 1e-16
 MAX_DUAL_RATIO = 1e8
 """Largest ratio, either way, of a multiplier and mu over its gap."""
 FRACTION_TO_BOUNDARY = 0.99
-"""Largest share of the distance to a bound in one step while mu is large."""
+"""Largest fraction of the distance to a bound in one step while mu is large."""
 LARGEST_FRACTION = 1.0 - 1e-4
 """The same when mu is small: a slack nearer to its bound than mu over its multiplier takes a gap
 below rounding errors."""
@@ -70,7 +70,7 @@ class Bounds:
 class Direction:
     """A direction of the outputs, the slacks and the multipliers, (R,) each.
 
-    primal, dual: the largest shares of it, up to 1, that slacks and multipliers may take.
+    primal, dual: the largest fractions of it, up to 1, that slacks and multipliers may take.
     largest_force: the largest |zu - zl| at its end. largest_residual: the largest |y - s| before.
     """
 
@@ -226,7 +226,7 @@ class Barrier:
         return Direction(dy, ds, dzl, dzu, *ends)
 
     def mean_product(self, along: Direction | None = None) -> float:
-        """The mean product of multipliers and gaps, here or after a direction's longest shares."""
+        """The mean product of multipliers and gaps, here or at the end of a direction."""
         if along is None:
             still = np.zeros_like(self.s)
             return native.mean_product(*self.arrays, still, still, still, 0.0, 0.0)
@@ -241,21 +241,21 @@ class Barrier:
         return lower, upper
 
     def centered_targets(self, y: Array, of: Direction, mu: float, targets: Pair) -> Pair:
-        """Targets that bring outliers among the products nearer to mu, for longer shares."""
+        """Targets that bring outliers among the products nearer to mu, for longer fractions."""
         lower, upper = targets[0].copy(), targets[1].copy()
-        primal, dual = (min(1.0, 1.08 * share + 0.18) for share in (of.primal, of.dual))
+        primal, dual = (min(1.0, 1.08 * fraction + 0.18) for fraction in (of.primal, of.dual))
         d = (of.ds, of.dzl, of.dzu)
         native.center(*self.arrays, y, *d, primal, dual, mu, SLACK_MATCHED, lower, upper)
         return lower, upper
 
-    def merit(self, y: Array, penalty: float, along: Direction, share: float) -> float:
-        """The barrier plus penalty sum weights |y - s| after a share of a direction."""
+    def merit(self, y: Array, penalty: float, along: Direction, fraction: float) -> float:
+        """The barrier plus penalty sum weights |y - s| after a fraction of a direction."""
         w, d = self.bounds.weights, along
         keep = self.boundary_fraction
-        return native.merit(*self.arrays, w, y, d.dy, d.ds, share, keep, self.mu, penalty)
+        return native.merit(*self.arrays, w, y, d.dy, d.ds, fraction, keep, self.mu, penalty)
 
-    def moved(self, y: Array, along: Direction, share: float, penalty: float) -> Barrier:
-        """Slacks after a share of a direction, multipliers as far as they stay positive.
+    def moved(self, y: Array, along: Direction, fraction: float, penalty: float) -> Barrier:
+        """Slacks after a fraction of a direction, multipliers as far as they stay positive.
 
         y: the outputs there. A slack becomes its output where that is inside the bounds and lowers
         the merit.
@@ -264,7 +264,7 @@ class Barrier:
         keep = self.boundary_fraction
         dual = 1.0 if along.dual >= 1.0 else keep * along.dual
         d = (along.ds, along.dzl, along.dzu)
-        numbers = (share, dual, keep, self.mu, penalty, MAX_DUAL_RATIO)
+        numbers = (fraction, dual, keep, self.mu, penalty, MAX_DUAL_RATIO)
         native.move(*self.arrays, y, *d, *numbers, s, zl, zu)
         return dataclasses.replace(self, s=s, zl=zl, zu=zu)
 
@@ -303,7 +303,7 @@ class Barrier:
 
     @property
     def boundary_fraction(self) -> float:
-        """Largest share of a gap that one step takes."""
+        """Largest fraction of a gap that one step takes."""
         return min(max(FRACTION_TO_BOUNDARY, 1.0 - self.mu / self.scale), LARGEST_FRACTION)
 
     def _clipped(self) -> Barrier:

@@ -23,8 +23,8 @@ Array = npt.NDArray[np.float64]
 
 LEAST_STIFFNESS = 1e-2
 """Eigenvalue of S times the penalty below which a combination of equations is left to the penalty.
-It is nearly one where nothing holds the combination back. Where bounds do, steps that meet it would
-be cut to nothing, and its multiplier would grow without end."""
+It is nearly one where nothing holds the combination back. Where bounds do, steps that satisfy it
+would be cut to nothing, and its multiplier would grow without end."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,7 +150,7 @@ class EquationFactor:
 
 
 class EquationModel(QuadraticModel):
-    """A banded model of an augmented Lagrangian, whose Newton steps meet linearised equations.
+    """A banded model of an augmented Lagrangian, whose Newton steps satisfy linearised equations.
 
     Steps with a shift are those of the model alone, which its penalty leads to the equations.
     rows: A, shape (E, size). residual: c, shape (E,). penalty: of c^2 / 2 in the model, by which

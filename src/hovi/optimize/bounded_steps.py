@@ -33,18 +33,19 @@ LARGER_DENSITY, LEAST_DENSITY = 3.0, 1e-5
 of the last barrier parameter, and the least unit, relative to the first one."""
 LONG_STEP = 0.95
 """Shares of a direction above which it needs no correction."""
-SHORTER_SHARES = 0.8, 0.6, 0.4, 0.2, 0.1, 0.03, 0.01, 1e-3
+SHORTER_FRACTIONS = 0.8, 0.6, 0.4, 0.2, 0.1, 0.03, 0.01, 1e-3
 """Shares of the longest step that are tried: of a plain one as long as they predict more, so that
 it ends away from the bounds; of a corrected one until one of them predicts a decrease."""
 
-FULL_REACTION_SHARE = 0.1
-"""Share of a step from which it takes the whole change of the multipliers of equations. A shorter
-one takes share / 0.1 of it: a step that bounds cut to next to nothing says little about them."""
+FULL_REACTION_FRACTION = 0.1
+"""Fraction of a step from which it takes the whole change of the multipliers of equations. A
+shorter one takes fraction / 0.1 of it: a step that bounds cut to next to nothing says little about
+them."""
 ALIKE, MOST_GROWTH = 0.05, 4.0
 """Relative difference of the actual and the predicted decrease up to which the radius grows by the
 second of these, if the objective reopens; others begin with a radius that is wide enough."""
-SHORT_SHARE = 0.1
-"""Share of a step at the radius below which it was too long for the bounds that cut it."""
+SHORT_FRACTION = 0.1
+"""Fraction of a step at the radius below which it was too long for the bounds that cut it."""
 MATCHED = 1e-4
 """Largest |y - s| at which the radius follows such steps."""
 CUT_RADIUS = 10.0
@@ -60,7 +61,7 @@ was refused."""
 class BoundedStep:
     """A step of the primal-dual system, shortened such that the slacks stay inside.
 
-    along: the whole direction. share: of it that is taken.
+    along: the whole direction. fraction: of it that is taken.
     decrease: predicted decrease of the merit function.
     remaining: decrease that the whole direction predicts for the objective with its barrier.
     barrier: of the current point, with the mu that the step aims at. before: its merit there.
@@ -69,7 +70,7 @@ class BoundedStep:
 
     trial: Trial
     along: Direction
-    share: float
+    fraction: float
     decrease: float
     remaining: float
     barrier: Barrier
@@ -126,7 +127,7 @@ class BoundedSteps(Generic[X]):
         ahead = self.product > 2.0 * self.final_mu or self.ended.z.mu > 1.01 * self.final_mu
         if trial.newton and not self.cautious and ahead:
             step = self._corrected(trial, model)
-            short = step.share * step.trial.norm <= MAX_STRETCH * self.radius
+            short = step.fraction * step.trial.norm <= MAX_STRETCH * self.radius
             if short and step.decrease > -10 * self.noise:
                 self.ended.corrected = True
                 return step
@@ -194,39 +195,42 @@ class BoundedSteps(Generic[X]):
         square -= float(np.vdot(weights * self.sigma, along.dy**2))
         before = barrier.merit(y, self.penalty, along, 0.0)
 
-        def decrease(share: float) -> float:
+        def decrease(fraction: float) -> float:
             # the merit function has the multipliers after the step
-            smooth = share * (slope - _reaction_share(share) * reacted) + 0.5 * share**2 * square
-            return before - barrier.merit(y, self.penalty, along, share) - smooth
+            smooth = (
+                fraction * (slope - _reaction_fraction(fraction) * reacted)
+                + 0.5 * fraction**2 * square
+            )
+            return before - barrier.merit(y, self.penalty, along, fraction) - smooth
 
         inside = along.primal >= 1.0  # a slack at the end of a whole step is kept off its bound
         longest = 1.0 if inside else barrier.boundary_fraction * along.primal
-        share, predicted = longest, decrease(longest)
-        for shorter in SHORTER_SHARES:
+        fraction, predicted = longest, decrease(longest)
+        for shorter in SHORTER_FRACTIONS:
             if abs(predicted) <= 10 * self.noise or (pulled is not None and predicted > 0):
                 break
             other = decrease(shorter * longest)
             if other < predicted:
                 break
-            share, predicted = shorter * longest, other
+            fraction, predicted = shorter * longest, other
         trial = trial._replace(step=s, norm=math.sqrt(max(norm2, 0.0)))
-        change = None if reaction is None else _reaction_share(share) * reaction[0]
-        return BoundedStep(trial, along, share, predicted, 0.5 * whole, barrier, before, change)
+        change = None if reaction is None else _reaction_fraction(fraction) * reaction[0]
+        return BoundedStep(trial, along, fraction, predicted, 0.5 * whole, barrier, before, change)
 
     def radius_after(self, step: BoundedStep, ratio: float) -> float:
         """The radius after a step, which the bounds may have cut."""
         norm, last = step.trial.norm, self.radius
-        length = norm * step.share
+        length = norm * step.fraction
         radius, reopens = next_radius(last, length, ratio), self.objective.reopens
         if reopens and abs(ratio - 1.0) <= ALIKE and length > 0.7 * last:
             return max(radius, MOST_GROWTH * last)
-        if step.trial.newton or step.share >= SHORT_SHARE:
+        if step.trial.newton or step.fraction >= SHORT_FRACTION:
             return radius
         if self.ended.violation <= MATCHED:
             return min(radius, max(CUT_RADIUS * length, LEAST_CUT_RADIUS))
         if not reopens:
             return radius
-        # a radius as short as the step would lead nowhere while bounds are not met
+        # a radius as short as the step would lead nowhere while bounds are not satisfied
         return min(last, norm) * (SHORTENED if ratio > 1e-4 else SHORTENED**2)
 
     def scale(self) -> float:
@@ -236,8 +240,8 @@ class BoundedSteps(Generic[X]):
     @property
     def final_mu(self) -> float:
         """The last mu, for the first mean density, or the present one where that is far smaller."""
-        share = LARGER_DENSITY * self.scale() / (self.density * self._measure)
-        return self.criteria.barrier * self.density * min(max(share, LEAST_DENSITY), 1.0)
+        fraction = LARGER_DENSITY * self.scale() / (self.density * self._measure)
+        return self.criteria.barrier * self.density * min(max(fraction, LEAST_DENSITY), 1.0)
 
     @property
     def noise(self) -> float:
@@ -249,6 +253,6 @@ class BoundedSteps(Generic[X]):
         return self.objective.bounds.measure
 
 
-def _reaction_share(share: float) -> float:
-    """Share of the change of the multipliers of equations that a share of a step takes."""
-    return min(1.0, share / FULL_REACTION_SHARE)
+def _reaction_fraction(fraction: float) -> float:
+    """Fraction of the change of the multipliers of equations that a fraction of a step takes."""
+    return min(1.0, fraction / FULL_REACTION_FRACTION)

@@ -204,8 +204,8 @@ class ConstrainedModel:
             curvature = float(p @ Au)
             if not 0.0 < curvature < np.inf:  # rows that depend on each other
                 break
-            share = square / curvature
-            s, z, r = s - share * u, z + share * p, r - share * Au
+            fraction = square / curvature
+            s, z, r = s - fraction * u, z + fraction * p, r - fraction * Au
             before, square = square, float(r @ r)
             p = r + (square / before) * p
         return s, z + penalty * r

@@ -35,7 +35,7 @@ import numpy.typing as npt
 
 from hovi.optimize.barrier import Barrier
 from hovi.optimize.bounded_objective import BoundedObjective, Refinement
-from hovi.optimize.bounded_steps import MATCHED, SHORT_SHARE, BoundedStep, BoundedSteps
+from hovi.optimize.bounded_steps import MATCHED, SHORT_FRACTION, BoundedStep, BoundedSteps
 from hovi.optimize.criteria import Criteria
 from hovi.optimize.ended import FEASIBILITY_TOLERANCE, Ended, Iteration, Reason
 from hovi.optimize.quadratic_model import QuadraticModel, decrease_ratio, next_shift
@@ -49,8 +49,8 @@ X = TypeVar("X")
 INITIAL_MU = 0.1
 """First barrier parameter, relative to the mean density of the objective."""
 WHOLE_STEP = 0.9
-"""Share of a step from which it is a whole one, after which little remains."""
-SHORT_STEP_SHARE = 1e-4
+"""Fraction of a step from which it is a whole one, after which little remains."""
+SHORT_STEP_FRACTION = 1e-4
 """Decrease that may remain where the last step was no whole one, relative to that of whole ones."""
 FIRST_REFINEMENT = 1e-2
 """Mean product z gap, relative to the mean density, below which outputs are first refined."""
@@ -72,10 +72,10 @@ SAVED_AGAIN = 1.5
 """A saved iterate is replaced while the mean product is below this many times its first one."""
 MAX_REFINEMENTS = 40
 """Maximum number of refinements."""
-CUT_SHARE, MOST_CUT, RAISED = 0.5, 4, 10.0
-"""Share of a step below which the bounds cut it where the model is not convex (SHORT_SHARE where it
-is), the number of such steps in a row after which the barrier parameter is raised, since it has
-fallen too early, and the factor by which it is raised."""
+CUT_FRACTION, MOST_CUT, RAISED = 0.5, 4, 10.0
+"""Fraction of a step below which the bounds cut it where the model is not convex (SHORT_FRACTION
+where it is), the number of such steps in a row after which the barrier parameter is raised, since
+it has fallen too early, and the factor by which it is raised."""
 LEAST_RAISED_GAP = 1e-9
 """Least distance of slacks from their bounds after that, relative to the range."""
 MOST_TRANSFERRED = 5e-3
@@ -190,7 +190,7 @@ class _Iteration(BoundedSteps[X]):
     def _try(self, step: BoundedStep, model: QuadraticModel) -> bool:
         ended, trial, along = self.ended, step.trial, step.along
         barrier = step.barrier
-        moved_step = step.share * trial.step
+        moved_step = step.fraction * trial.step
         x = self.objective.retract(ended.x, moved_step, model)
         before = ended.outputs.value + self._hold(step.reaction, 1.0)
         try:
@@ -201,13 +201,13 @@ class _Iteration(BoundedSteps[X]):
         old = before + step.before
         new, moved = math.inf, barrier
         if np.isfinite(outputs.value):
-            moved = barrier.moved(outputs.y, along, step.share, self.penalty)
+            moved = barrier.moved(outputs.y, along, step.fraction, self.penalty)
             new = outputs.value + moved.merit(outputs.y, self.penalty, along, 0.0)
         ratio = decrease_ratio(old - new, step.decrease, self.noise)
         ended.steps.append(Iteration(outputs.value, step.decrease, ratio, trial.shift, self.radius))
         if self.report is not None:
             self.report(len(ended.steps), outputs.value)
-        length = trial.norm * step.share
+        length = trial.norm * step.fraction
         last, radius = self.radius, self.radius_after(step, ratio)
         self.shift = next_shift(trial.shift, trial.norm, radius)
         self.radius = radius
@@ -265,7 +265,7 @@ class _Iteration(BoundedSteps[X]):
         return self.criteria.escape_saddles and self.saddles <= MAX_SADDLES
 
     def _is_hopeless(self) -> bool:
-        """Whether the bounds seem impossible to meet from here."""
+        """Whether the bounds seem impossible to satisfy from here."""
         slow = False
         if len(self.violations) > MAX_SLOW_STEPS:
             last = self.violations[-MAX_SLOW_STEPS - 1 :]
@@ -281,8 +281,8 @@ class _Iteration(BoundedSteps[X]):
             return False
         self.reopenings += 1
         level = REOPENED_LEVEL * self.product / self.density
-        share = max(min(REOPENED * outside, MOST_REOPENED), LEAST_REOPENED, level)
-        self._move_inside(share * self.density, max(REOPENED * outside, LEAST_REOPENED))
+        fraction = max(min(REOPENED * outside, MOST_REOPENED), LEAST_REOPENED, level)
+        self._move_inside(fraction * self.density, max(REOPENED * outside, LEAST_REOPENED))
         return True
 
     def _move_inside(self, mu: float, margin: float) -> None:
@@ -307,8 +307,8 @@ class _Iteration(BoundedSteps[X]):
         """Whether the last step, of the last mu, predicts next to nothing for its whole length."""
         last = step.barrier.mu <= 1.01 * self.final_mu and self.product <= 10.0 * self.final_mu
         enough = max(self.criteria.decrease, self.criteria.enough) * self.scale()
-        whole = accepted and step.share >= WHOLE_STEP
-        small = step.remaining <= SHORT_STEP_SHARE * enough
+        whole = accepted and step.fraction >= WHOLE_STEP
+        small = step.remaining <= SHORT_STEP_FRACTION * enough
         if whole:
             small = max(step.remaining, step.decrease) <= enough
         if not (last and small and step.trial.newton and self.ended.feasible):
@@ -319,21 +319,21 @@ class _Iteration(BoundedSteps[X]):
     def _reduce_mu(self, step: BoundedStep) -> None:
         """Reduce mu after a plain step once its problem is solved."""
         ended, barrier = self.ended, self.ended.z
-        last, share = self.final_mu, barrier.mu / self.density
+        last, fraction = self.final_mu, barrier.mu / self.density
         solved = (
             step.trial.newton
             and step.decrease <= 10 * barrier.mu * self._measure
-            and ended.violation <= max(FEASIBILITY_TOLERANCE, 0.1 * share)
+            and ended.violation <= max(FEASIBILITY_TOLERANCE, 0.1 * fraction)
             and barrier.complementarity() <= 10 * barrier.mu
         )
         if solved:
-            mu = max(last, min(0.1 * barrier.mu, self.density * share**1.5))
+            mu = max(last, min(0.1 * barrier.mu, self.density * fraction**1.5))
             ended.z = barrier.with_mu(mu)
 
     def _raise_mu(self, step: BoundedStep) -> None:
         """Raise mu if bounds have cut several steps in a row: steps along them would stay short."""
         ended, objective = self.ended, self.objective
-        cut = step.share < (SHORT_SHARE if step.trial.newton else CUT_SHARE)
+        cut = step.fraction < (SHORT_FRACTION if step.trial.newton else CUT_FRACTION)
         self.cut = self.cut + 1 if cut and ended.feasible and not objective.reopens else 0
         mu = min(RAISED * max(ended.z.mu, self.product), INITIAL_MU * self.density)
         if self.cut < MOST_CUT or mu <= ended.z.mu:

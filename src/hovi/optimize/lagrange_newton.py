@@ -2,9 +2,9 @@
 
 A step s and the new multipliers solve the KKT equations [H + shift D, A^T; A, 0] of the Lagrangian
 f + y.c, with the smallest shift for which its Hessian is positive definite on the tangent space of
-the constraints. A share of the step is accepted by a filter: it decreases the residual |c| or the
-objective f, and neither undoes what earlier steps gained. Near a minimum whole steps converge
-quadratically. Where no share is accepted, the residual is made smaller alone.
+the constraints. A fraction of the step is accepted by a filter: it decreases the residual |c| or
+the objective f, and neither undoes what earlier steps gained. Near a minimum whole steps converge
+quadratically. Where no fraction is accepted, the residual is made smaller alone.
 [WaechterBiegler2006]
 """
 
@@ -41,8 +41,8 @@ SHIFT_GROWTH = 4.0
 """Factor from a shift that is too small to the next one."""
 MAX_SHIFTS = 40
 """Number of shifts after which the model counts as not finite."""
-LEAST_SHARE = 1e-9
-"""Smallest share of a step that is tried."""
+LEAST_FRACTION = 1e-9
+"""Smallest fraction of a step that is tried."""
 MAX_SECOND_ORDER_CORRECTIONS = 2
 """Corrections of a step by the residual where it leads."""
 FILTER_MARGIN = 1e-5
@@ -86,11 +86,11 @@ def minimize_under_equations(
 
 
 class _Trial(NamedTuple):
-    """An accepted step: where it leads, f and c there, its share, and whether f decides."""
+    """An accepted step: where it leads, f and c there, its fraction, and whether f decides."""
 
     x: object
     outputs: Outputs
-    share: float
+    fraction: float
     by_value: bool
 
 
@@ -182,9 +182,11 @@ class _Search(Generic[X]):
         if settled and shift > 0.0:
             return self._at_saddle(model, factor, shift)
         trial = self._search_along(model, factor, step)
-        value, share = (ended.value, 0.0) if trial is None else (trial.outputs.value, trial.share)
+        value, fraction = (
+            (ended.value, 0.0) if trial is None else (trial.outputs.value, trial.fraction)
+        )
         length, residual = model.length(step), self.size
-        ended.steps.append(Iteration(value, decrease, share, shift, length, residual))
+        ended.steps.append(Iteration(value, decrease, fraction, shift, length, residual))
         if self.report is not None:
             self.report(len(ended.steps), value)
         if trial is None:
@@ -192,9 +194,9 @@ class _Search(Generic[X]):
         if not trial.by_value:
             self.filter.add(ended.value, self.size)
         self._move(trial)
-        ended.z = ended.z + trial.share * change
+        ended.z = ended.z + trial.fraction * change
         last = settled and self._is_last(relative)
-        self.before = relative if shift == 0.0 and trial.share == 1.0 else math.inf
+        self.before = relative if shift == 0.0 and trial.fraction == 1.0 else math.inf
         return last and self._at_minimum()
 
     def _is_last(self, decrease: float) -> bool:
@@ -214,25 +216,25 @@ class _Search(Generic[X]):
         self.size = size_of(trial.outputs.y)
 
     def _search_along(self, model: ConstrainedModel, factor: Factor, step: Array) -> _Trial | None:
-        """The largest share of a step, halved again and again, that the filter accepts."""
+        """The largest fraction of a step, halved again and again, that the filter accepts."""
         ended = self.ended
         slope = float(model.slope @ step)
-        share = 1.0
-        while share >= LEAST_SHARE:
-            x = self.objective.retract(ended.x, share * step, model)
+        fraction = 1.0
+        while fraction >= LEAST_FRACTION:
+            x = self.objective.retract(ended.x, fraction * step, model)
             there = self.objective.evaluate(x)
             size = size_of(there.y)
-            accepted = self._accepted(there.value, size, share, slope)
+            accepted = self._accepted(there.value, size, fraction, slope)
             if accepted is not None:
-                return _Trial(x, there, share, accepted)
-            if share == 1.0 and size >= 0.5 * self.size and math.isfinite(size):
+                return _Trial(x, there, fraction, accepted)
+            if fraction == 1.0 and size >= 0.5 * self.size and math.isfinite(size):
                 corrected = self._corrected(model, factor, there.y, slope)
                 if corrected is not None:
                     return corrected
-            share *= 0.5
+            fraction *= 0.5
         return None
 
-    def _accepted(self, value: float, size: float, share: float, slope: float) -> bool | None:
+    def _accepted(self, value: float, size: float, fraction: float, slope: float) -> bool | None:
         """Whether a point is accepted for its value; None if it is not accepted at all."""
         if not math.isfinite(value) or not size <= self.largest:
             return None
@@ -243,9 +245,9 @@ class _Search(Generic[X]):
         if (
             before <= self.small
             and slope < 0.0
-            and share * min(-slope, LARGE_SLOPE) ** 2.3 > before**1.1
+            and fraction * min(-slope, LARGE_SLOPE) ** 2.3 > before**1.1
         ):
-            return True if value <= now + ARMIJO * share * slope + noise else None
+            return True if value <= now + ARMIJO * fraction * slope + noise else None
         smaller = size <= (1.0 - FILTER_MARGIN) * before or value <= now - VALUE_MARGIN * before
         return False if smaller else None
 
@@ -299,7 +301,7 @@ class _Search(Generic[X]):
             return True
         ended.saddles.append(ended.value)
         decrease = ended.value - trial.outputs.value
-        radius = trial.share
+        radius = trial.fraction
         ended.steps.append(Iteration(trial.outputs.value, decrease, 1.0, shift, radius, self.size))
         self._move(trial)
         self.filter, self.before = _Filter(), math.inf
@@ -323,7 +325,7 @@ class _Search(Generic[X]):
         ended, length = self.ended, self.criteria.radius
         none = np.zeros_like(model.gradient)
         weight = 2.0 * float(np.linalg.norm(ended.z))
-        while length > LEAST_SHARE * self.criteria.radius:
+        while length > LEAST_FRACTION * self.criteria.radius:
             step = length * along
             x = self.objective.retract(ended.x, step, model)
             there = self.objective.evaluate(x)

@@ -75,23 +75,23 @@ def merge_levels(steps: Array) -> list[MergeLevel]:
     while len(lengths) > 1:
         P = len(lengths) // 2
         joint = lengths[0 : 2 * P : 2] + lengths[1 : 2 * P : 2]
-        share = lengths[0 : 2 * P : 2] / joint
-        left, right = _split_tables(share[:1] if np.ptp(share) == 0 else share)
+        fraction = lengths[0 : 2 * P : 2] / joint
+        left, right = _split_tables(fraction[:1] if np.ptp(fraction) == 0 else fraction)
         levels.append(MergeLevel(left, right, P))
         lengths = np.concatenate([joint, lengths[2 * P :]])
     return levels
 
 
-def _split_tables(share: Array) -> tuple[Array, Array]:
-    """Coordinates of both parts of an interval that is split at `share` of its length.
+def _split_tables(fraction: Array) -> tuple[Array, Array]:
+    """Coordinates of both parts of an interval that is split at `fraction` of its length.
 
     At the split the cubic through the ends has the values q1 = q0 + x and H v1; Y is added to them.
     """
-    s, b = share, 1 - share
+    s, b = fraction, 1 - fraction
     zero, one = np.zeros_like(s), np.ones_like(s)
     x = np.stack([one, s, s**2 * (3 - 2 * s), s**2 * (s - 1), one, zero], axis=1)
     Hv = np.stack([zero, one, 6 * s * b, s * (3 * s - 2), zero, one], axis=1)
-    dq = x.copy()  # q1 - q0 - share H v0
+    dq = x.copy()  # q1 - q0 - fraction H v0
     dq[:, :2] = 0
     dv = Hv.copy()  # H v1 - H v0
     dv[:, 1] = 0

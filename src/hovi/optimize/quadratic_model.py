@@ -106,8 +106,8 @@ def next_radius(radius: float, norm: float, ratio: float) -> float:
     norm: length of the step. ratio: actual over predicted decrease.
     """
     if ratio < 0.25:
-        share = min(0.5, 0.5 / (1.0 - min(ratio, 0.0)))
-        return max(0.25, share) * min(radius, norm)
+        fraction = min(0.5, 0.5 / (1.0 - min(ratio, 0.0)))
+        return max(0.25, fraction) * min(radius, norm)
     if ratio > 0.75 and norm > 0.7 * radius:
         return (2.0 if ratio > 0.9 else 1.4) * radius
     return radius

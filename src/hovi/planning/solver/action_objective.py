@@ -38,10 +38,10 @@ LinearAlgebra = Literal["band", "tree"]
 MAX_CHART_TURN = 1.4 * np.pi
 """Turn of an orientation within an interval, in [rad], above which the value is infinite."""
 TORQUE_FLOOR = 1e-4
-"""Lower bound of the torque scale for residuals, as a share of the inertial torque M / T^2."""
+"""Lower bound of the torque scale for residuals, as a fraction of the inertial torque M / T^2."""
 CHART_TORQUE_FLOOR = 2e-5
-"""The same with charts, as a share of M |q| / h^2: rounding of the nodes moves torques by 5e-16 of
-it, and the equations of passive joints are solved to 1e-10 of the torque scale."""
+"""The same with charts, as a fraction of M |q| / h^2: rounding of the nodes moves torques by 5e-16
+of it, and the equations of passive joints are solved to 1e-10 of the torque scale."""
 MAX_BAND_INTERVALS = 1000
 """Maximum number of intervals for the nodal band matrix; its condition number grows like N^4."""
 
@@ -289,7 +289,7 @@ class ActionObjective(Objective[DiscretePath]):
             expansion.hessian[k, columns, columns] += curvature.transpose(0, 2, 1, 3)
 
     def under_conditions(self, x: DiscretePath, model: BandModel) -> EquationModel:
-        """A model at x whose Newton steps meet the conditions at nodes to first order."""
+        """A model at x whose Newton steps satisfy the conditions at nodes to first order."""
         assert self.multipliers is not None
         rows, residuals = [], []
         for each in self.problem.equations:

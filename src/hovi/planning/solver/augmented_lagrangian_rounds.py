@@ -16,7 +16,7 @@ from hovi.planning.solver.multipliers import Multipliers, Residuals, largest_res
 
 INITIAL_TORQUE_PENALTY = 10.0
 """Initial penalty of passive torques, relative to the mean weight of the other joints."""
-WARM_TORQUE_SHARE = 0.1
+WARM_TORQUE_FRACTION = 0.1
 """Passive torque of a guess, relative to the largest torque, up to which it counts as warm."""
 WARM_PENALTY_FACTOR = 1e3
 """Factor of the initial torque penalty for a warm guess."""
@@ -56,7 +56,7 @@ def minimize_constrained(
     """Minimise subject to the problem's equality constraints.
 
     Returns how the last round ended, its multipliers, or updated ones after MAX_ROUNDS, and why the
-    constraints cannot be met, as a sentence without its end, or "".
+    constraints cannot be satisfied, as a sentence without its end, or "".
 
     minimize: minimises the augmented Lagrangian with given multipliers, from a path, to a
         relative decrease.
@@ -70,7 +70,7 @@ def minimize_constrained(
         result = minimize(multipliers, path, decrease)
         path = result.x
         residuals = ActionObjective(problem, multipliers=multipliers).residuals(path)
-        sizes = residuals.torque_share, residuals.node_error
+        sizes = residuals.torque_fraction, residuals.node_error
         if result.why is not Reason.STATIONARY or are_met(residuals):
             break
         slow = [
@@ -107,8 +107,8 @@ def first_multipliers(problem: TrajectoryProblem, path: DiscretePath) -> Multipl
     weight = mean_output_weight(problem)
     cost = max(abs(problem.ld.action(path)), 1e-6)
     zero = Multipliers.zero(problem, INITIAL_TORQUE_PENALTY * weight, INITIAL_NODE_PENALTY * cost)
-    share = ActionObjective(problem, multipliers=zero).residuals(path).torque_share
-    warm = share <= WARM_TORQUE_SHARE
+    fraction = ActionObjective(problem, multipliers=zero).residuals(path).torque_fraction
+    warm = fraction <= WARM_TORQUE_FRACTION
     return zero.with_scaled_penalties(WARM_PENALTY_FACTOR, 1.0) if warm else zero
 
 
@@ -124,9 +124,9 @@ def are_met(residuals: Residuals) -> bool:
     return within(residuals, TORQUE_TOLERANCE, NODE_TOLERANCE)
 
 
-def within(residuals: Residuals, torque_share: float, node_error: float) -> bool:
+def within(residuals: Residuals, torque_fraction: float, node_error: float) -> bool:
     """Whether passive torques and conditions at nodes are within these tolerances."""
-    return residuals.torque_share <= torque_share and residuals.node_error <= node_error
+    return residuals.torque_fraction <= torque_fraction and residuals.node_error <= node_error
 
 
 def _at_maximum_penalty(now: Multipliers, first: Multipliers, slow: list[bool]) -> bool:
@@ -151,11 +151,11 @@ def unmet_sentence(problem: TrajectoryProblem, path: DiscretePath, residuals: Re
 
     A sentence without its end.
     """
-    if residuals.torque_share > FEASIBLE_RESIDUAL or not problem.equations:
+    if residuals.torque_fraction > FEASIBLE_RESIDUAL or not problem.equations:
         return (
             f"no motion was found with zero torque at passive joint {passive_joints(problem)}: the "
-            f"remaining torque is {residuals.torque_share:.3g} of the largest; allow more time or "
-            "change the goal"
+            f"remaining torque is {residuals.torque_fraction:.3g} of the largest; allow more time "
+            "or change the goal"
         )
     worst = largest_residual(problem, residuals.nodes)[0]
     return (

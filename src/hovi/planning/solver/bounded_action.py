@@ -40,12 +40,12 @@ class BoundedAction(BoundedObjective[DiscretePath]):
 
     problem: the trajectory problem.
     limits: the bounds.
-    margins: share of its range by which each lower and upper bound is tightened in each interval,
-        shape (2, N, kinds nv + more); none if None.
+    margins: fraction of its range by which each lower and upper bound is tightened in each
+        interval, shape (2, N, kinds nv + more); none if None.
     algebra, multipliers: as for ActionObjective.
     more: further outputs.
     rows: control points, bounded instead of values at the points and refined in place; or None.
-    node_tolerance: largest residual of a condition at a node, in [rad] or [m], where steps meet
+    node_tolerance: largest residual of a condition at a node, in [rad] or [m], where steps satisfy
         these conditions and their multipliers follow; None where the multipliers stay.
     """
 
@@ -146,7 +146,7 @@ class BoundedAction(BoundedObjective[DiscretePath]):
         return self._under_conditions(x, model)
 
     def _under_conditions(self, x: DiscretePath, model: QuadraticModel) -> QuadraticModel:
-        """The model, whose steps meet conditions at nodes to first order if they are to."""
+        """The model, whose steps satisfy conditions at nodes to first order if they are to."""
         if self.node_tolerance is None or not isinstance(model, BandModel):
             return model
         return self.action.under_conditions(x, model)

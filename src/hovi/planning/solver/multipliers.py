@@ -32,7 +32,7 @@ class Residuals:
 
     torque: of the passive joints at the quadrature points, (P, passive) per batch, in [N m].
     nodes: c of every condition, shape (k,) each. largest_torque: of any joint at any point, in
-        [N m], bounded below by a small share of the inertial torque.
+        [N m], bounded below by a small fraction of the inertial torque.
     """
 
     torque: list[Array]
@@ -40,7 +40,7 @@ class Residuals:
     largest_torque: float
 
     @property
-    def torque_share(self) -> float:
+    def torque_fraction(self) -> float:
         """The largest torque of a passive joint, relative to `largest_torque`."""
         passive = max((float(np.max(np.abs(t), initial=0.0)) for t in self.torque), default=0.0)
         return passive / max(self.largest_torque, 1e-300)

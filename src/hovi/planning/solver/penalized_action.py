@@ -24,11 +24,11 @@ Array = npt.NDArray[np.float64]
 LEAST_VIOLATION_PENALTY = 1e6
 """Penalty, relative to the mean density of the action, at which the violation outweighs it."""
 STALLED = 0.1
-"""Share by which some steps have to decrease it; else it is near its least value."""
+"""Fraction by which some steps have to decrease it; else it is near its least value."""
 MAX_STEPS = 40
 """Maximum number of steps."""
 OUTWEIGHED = 0.5
-"""Largest share of the action in the penalized one that tells that limits cannot be met."""
+"""Fraction of the action in the penalized one below which the limits count as impossible."""
 
 
 class PenalizedAction(Objective[DiscretePath]):
@@ -40,7 +40,7 @@ class PenalizedAction(Objective[DiscretePath]):
         self._last: tuple[DiscretePath, Outputs] | None = None
 
     def violation(self, x: DiscretePath) -> float:
-        """Largest distance outside the bounds, as a share of the range."""
+        """Largest distance outside the bounds, as a fraction of the range."""
         return float(np.max(np.abs(self._outside(x)), initial=0.0))
 
     def value(self, x: DiscretePath) -> float:

@@ -65,8 +65,8 @@ if TYPE_CHECKING:
     from hovi.planning.solver.central_path import CentralPath
     from hovi.planning.solver.receding.shift import Shift
 
-SOLVE_SHARE = 0.6
-"""Share of a time limit of `replan` and `advance` for the solve, before the checks."""
+SOLVE_FRACTION = 0.6
+"""Fraction of a time limit of `replan` and `advance` for the solve, before the checks."""
 STATIONARY_DECREASE = 1e-9
 """Predicted relative decrease of a Newton step below which a motion counts as stationary."""
 
@@ -151,7 +151,7 @@ class Solution(SolutionSummary):
         guess: an earlier solution on the same grid; this one if None. The duration is kept.
         time_limit: for the whole call, in [s] or as "100 ms". When it is reached, the step of the
             solver that has begun and the end of the call are left to do. The status is then
-            TIME_LIMIT, and the motion the best one that meets the ends, the limits and the
+            TIME_LIMIT, and the motion the best one that satisfies the ends, the limits and the
             equations to 1e-6; if there is none, this motion as it is, and the message says what it
             misses. From a start that it misses, a braking motion to rest within the limits instead,
             where one is found: its goal is where it stops.
@@ -267,7 +267,7 @@ class _Again:
             try:
                 raise_if_late()
                 begun = True
-                found = self._solved(deadline.part(SOLVE_SHARE).seconds_left, options)
+                found = self._solved(deadline.part(SOLVE_FRACTION).seconds_left, options)
                 if found.status is not Status.TIME_LIMIT:
                     done = judged(found) if self.check is None else self.check(found)
                     if done.success or done.usable:

@@ -64,7 +64,7 @@ def unfinished(why: Reason) -> tuple[Status, str]:
 
 
 def infeasible_sentence(reason: str) -> str:
-    """The message about limits that no motion meets; reason: a clause."""
+    """The message about limits that no motion satisfies; reason: a clause."""
     return f"no motion within the limits was found: {reason}."
 
 

@@ -83,7 +83,7 @@ class TimedBoundedAction(BoundedObjective[TimedPath]):
         """The action for a duration, in [s]."""
         return self.at(duration).action
 
-    def share(self, duration: float) -> float:
+    def fraction(self, duration: float) -> float:
         """T0 / T, by which the forces of limits count in the integral over T."""
         return self.problem.grid.duration / duration
 
@@ -94,10 +94,10 @@ class TimedBoundedAction(BoundedObjective[TimedPath]):
 
     def model(self, x: TimedPath, sigma: Array, rho: Array, multipliers: Array) -> TimedModel:
         """The bordered model with the terms of the bounds: see BoundedObjective.model."""
-        at, share = self.at(x.duration), self.share(x.duration)
+        at, fraction = self.at(x.duration), self.fraction(x.duration)
         at.predict(self._slopes)
-        inner = at.model(x.path, share * sigma, share * rho, share * multipliers)
-        gradient, force = (at.forces(x.path, share * each) for each in (rho, multipliers))
+        inner = at.model(x.path, fraction * sigma, fraction * rho, fraction * multipliers)
+        gradient, force = (at.forces(x.path, fraction * each) for each in (rho, multipliers))
         forces = [Forces(*each) for each in zip(gradient, force, strict=True)]
         first = len(rho) - self.rows.size
         weights = self.bounds.weights[first:]
@@ -126,7 +126,7 @@ class TimedBoundedAction(BoundedObjective[TimedPath]):
         """Gradient of sum of weights (forces y) in the columns and log T."""
         assert isinstance(model, TimedModel)
         T = model.x.duration
-        columns = self.at(T).pull(self.share(T) * forces, model.inner)
+        columns = self.at(T).pull(self.fraction(T) * forces, model.inner)
         return np.append(columns, np.vdot(self.bounds.weights * forces, self._stretch))
 
     def accept(self, step: Array, model: QuadraticModel) -> None:

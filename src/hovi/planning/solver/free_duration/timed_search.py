@@ -111,9 +111,9 @@ class TimedSearch(BoundedSearch):
     ) -> Bounded:
         """The end of a solve for the problem of its duration, whose points weigh more or less."""
         T, barrier = found.x.duration, found.z
-        share, price = objective.share(T), self.price.weight * T
+        fraction, price = objective.fraction(T), self.price.weight * T
         saved = [
-            (share * product, self.problem.moved(stretched_path(x.path, T / x.duration)))
+            (fraction * product, self.problem.moved(stretched_path(x.path, T / x.duration)))
             for product, x in found.saved
             if abs(T / x.duration - 1.0) <= SAME_DURATION
         ]
@@ -123,9 +123,9 @@ class TimedSearch(BoundedSearch):
             dataclasses.replace(
                 barrier,
                 bounds=objective.at(T).bounds,
-                zl=share * barrier.zl,
-                zu=share * barrier.zu,
-                mu=share * barrier.mu,
+                zl=fraction * barrier.zl,
+                zu=fraction * barrier.zu,
+                mu=fraction * barrier.mu,
             ),
             found.why,
             found.steps,

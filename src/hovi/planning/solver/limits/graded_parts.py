@@ -25,11 +25,11 @@ Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
 
 SHORT = 0.25
-"""Length of a part across the time until which a limit is exceeded, as a share of that time."""
+"""Length of a part across the time until which a limit is exceeded, as a fraction of that time."""
 MOST_HALVINGS = 12
 """Number of times that the part at an end is halved at most."""
 SLACK = 0.5
-"""Share of the tolerance by which control points that an end gives may be outside."""
+"""Fraction of the tolerance by which control points that an end gives may be outside."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +47,7 @@ class GivenEnds:
         return cls(np.stack(pairs, axis=1), ~problem.free_ends)
 
     def control_points(self, end: int, order: int, joint: int, length: float, degree: int) -> Array:
-        """Those that an end gives on a part beside it, of a derivative of the motion."""
+        """Those that an end gives on a part next to it, of a derivative of the motion."""
         held = self.given[end, order:, joint]
         rates = self.jets[end, order:, joint][: int(np.cumprod(held).sum())]
         rates = rates * (-1.0 if end else 1.0) ** np.arange(len(rates))

@@ -39,15 +39,15 @@ RowsAtNodes = tuple[int, Index, Index, Index, Array]
 """An order of derivatives, and its rows: numbers, intervals, joints, and values at the nodes."""
 
 WEIGHT = 0.1
-"""Weight of a row in a barrier, as a share of the interval."""
+"""Weight of a row in a barrier, as a fraction of the interval."""
 LEAST_GAP = 1e-7
-"""Distance of the curve from a control point, as a share of the range, below which its part is not
-halved."""
+"""Distance of the curve from a control point, as a fraction of the range, below which its part is
+not halved."""
 LEAST_LOSS = 1e-7
-"""Rise of the cost by the distance of one control point, as a share of the cost, below
+"""Rise of the cost by the distance of one control point, as a fraction of the cost, below
 which its part is not halved."""
 MAX_LOSS = 1e-5
-"""Rise of the cost by all of them, as a share of the cost, below which none is."""
+"""Rise of the cost by all of them, as a fraction of the cost, below which none is."""
 LOSS_RATIO = 20.0
 """The same, relative to the last barrier parameter of the solve, if that is larger."""
 MAX_HALVINGS = 4
@@ -62,7 +62,7 @@ class LimitRows:
         are given if None. A control point that is given with an end has no row.
     halvings: of all intervals for the control points of positions, and for those of derivatives.
     barrier: the last barrier parameter, relative to the mean density of the cost.
-    ends: beside which parts are short enough for what is given there; None where it is not known.
+    ends: next to which parts are short enough for what is given there; None where it is not known.
 
     bounds: lower and upper ones of the E rows, (E,) each. weights: of the rows in a barrier, (E,),
     in [s]. at_nodes: cache of `forces_of`.
@@ -119,7 +119,7 @@ class LimitRows:
         rows = copy.copy(self)
         rows.grid = grid
         powers = (grid.duration / self.grid.duration) ** -self.orders[:, None].astype(float)
-        rows.weights, rows.at_nodes, rows._nodal = rows._share_of_intervals(), None, None
+        rows.weights, rows.at_nodes, rows._nodal = rows._fraction_of_intervals(), None, None
         rows._regular, rows._beyond = self._regular * powers, self._beyond * powers
         return rows
 
@@ -253,7 +253,7 @@ class LimitRows:
         for each in self.limits.excused:
             mine, wider = self._wider(each)
             (upper if each.side > 0 else lower)[mine] += each.side * wider
-        self.bounds, self.weights = (lower / ranges, upper / ranges), self._share_of_intervals()
+        self.bounds, self.weights = (lower / ranges, upper / ranges), self._fraction_of_intervals()
         scale = 1.0 / (ranges * self.grid.steps[self.intervals] ** self.orders)[:, None]
         base = np.where(self.orders == 0, 1.0 / ranges, 0.0)[:, None]
         self._regular = np.concatenate([base, rows.table * scale], axis=1)
@@ -273,7 +273,7 @@ class LimitRows:
         points[end == within.max(initial=0.0), -1] = 0.0
         return mine, points[np.arange(len(mine)), self._rows.number[mine]]
 
-    def _share_of_intervals(self) -> Array:
+    def _fraction_of_intervals(self) -> Array:
         """The weights."""
         return np.asarray(WEIGHT * self.grid.steps[self.intervals])
 
@@ -319,7 +319,7 @@ class LimitRows:
 
     @property
     def _places(self) -> Array:
-        """A number for interval, coordinate and position of the curve beside every row, (E,)."""
+        """A number for interval, coordinate and position of the curve at every row, (E,)."""
         return self._places_from(0)
 
     def _places_from(self, first: int) -> Array:
@@ -346,7 +346,7 @@ class _Rows(NamedTuple):
     """Rows of control points.
 
     part: number of their parts, (E,). number: of the control point in the part, (E,).
-    table, beside: of the control points, and of the curve beside them, (E, 2 k - 1 + r).
+    table, beside: of the control points, and of the curve at the same places, (E, 2 k - 1 + r).
     """
 
     part: Index

@@ -35,12 +35,12 @@ BUMPED_GUESSES = 1
 """Number of perturbed guesses that are tried before limits are reported as infeasible."""
 SAME_VIOLATION = 1.5
 """Ratio of the squares up to which two minima of the violation are taken as one."""
-BUMP_SHARE = 0.3
-"""Share of a perturbation of the guess that keeps it near enough for few steps."""
+BUMP_FRACTION = 0.3
+"""Fraction of a perturbation of the guess that keeps it near enough for few steps."""
 BUMP_HALVINGS = 8
-"""Number of shares of a perturbation, each half of the one before, that charts are tried with."""
+"""Number of fractions of a perturbation, each half of the last, that charts are tried with."""
 SMALL_VIOLATION = 1e-3
-"""Violation, as a share of the range, below which the interior point is tried again."""
+"""Violation, as a fraction of the range, below which the interior point is tried again."""
 
 
 def locally_infeasible(search: BoundedSearch, ended: Bounded) -> str:
@@ -56,7 +56,7 @@ def locally_infeasible(search: BoundedSearch, ended: Bounded) -> str:
     density = ended.outputs.density(objective.bounds.measure)
     penalized = PenalizedAction(objective, LEAST_VIOLATION_PENALTY * density)
     found: list[Ended[DiscretePath, None]] = []
-    for path in (ended.x, search.guess, _bumped_guess(search, 0, BUMP_SHARE)):
+    for path in (ended.x, search.guess, _bumped_guess(search, 0, BUMP_FRACTION)):
         each = least_violation(penalized, path, search.remaining_criteria())
         search.iterations += len(each.steps)
         found.append(each)
@@ -123,13 +123,13 @@ def _without_forces(
     return objective, outputs, Barrier.inactive(objective.bounds, outputs.y)
 
 
-def _bumped_guess(search: BoundedSearch, seed: int, share: float = 1.0) -> DiscretePath:
-    """The guess with a bump, of a smaller share where it turns too far for a chart."""
+def _bumped_guess(search: BoundedSearch, seed: int, fraction: float = 1.0) -> DiscretePath:
+    """The guess with a bump, of a smaller fraction where it turns too far for a chart."""
     problem = search.problem
     T = problem.grid.duration
     base = stretched(problem.trajectory(search.guess), T, problem.ld.k)
     for halvings in range(BUMP_HALVINGS):
-        bump = with_bump(base, problem.coordinates, T, seed, share * 0.5**halvings)
+        bump = with_bump(base, problem.coordinates, T, seed, fraction * 0.5**halvings)
         with suppress(ChartError):
             return problem.path(bump)
     return search.guess

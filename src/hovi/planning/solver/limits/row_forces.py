@@ -89,7 +89,7 @@ def _at_nodes(rows: LimitRows) -> list[RowsAtNodes]:
 def _values_in(table: Array, grid: Grid, order: int) -> Array:
     """Rows of h^j q^(j), or q, over (h q0', ..., Z, c) as sums of its values at nodes, (E, M)."""
     inverse = _inverse_values(grid.order, grid.inner_modes, order)
-    if order == 0:  # rows of q have a share of 1 in q0
+    if order == 0:  # rows of q have a fraction of 1 in q0
         return np.asarray(table @ inverse[1:] + inverse[0])
     return np.asarray(table @ inverse)
 

@@ -1,6 +1,6 @@
 """Distances are bounded only for the pairs of shapes that would come too close.
 
-Most pairs stay far from each other, and then cost nothing but a check of the motion.
+Most pairs stay far from each other, and then need no more than a check of the motion.
 """
 
 from __future__ import annotations

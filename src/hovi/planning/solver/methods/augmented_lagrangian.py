@@ -93,7 +93,7 @@ def constrained_status(
     nit: int,
     n_neg: int,
 ) -> tuple[Status, str]:
-    """Status and message; INFEASIBLE for a reason why the constraints cannot be met.
+    """Status and message; INFEASIBLE for a reason why the constraints cannot be satisfied.
 
     Other arguments as of `status_of`.
     """
@@ -127,7 +127,7 @@ def _polished(
     residuals = objective.residuals(path)
     first = path, known.updated(residuals, problem.passive)
     allowed = (
-        max(TORQUE_TOLERANCE, residuals.torque_share),
+        max(TORQUE_TOLERANCE, residuals.torque_fraction),
         max(NODE_TOLERANCE, residuals.node_error),
     )
     known = _smallest_penalty(problem, path, known) if steps > 0 else known

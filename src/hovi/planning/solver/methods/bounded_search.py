@@ -79,11 +79,11 @@ class BoundedSearch:
     problem: on the current grid; its intervals are halved where limits do not hold.
     start: the initial guess; guess: the same on the problem's grid.
     iterations: steps of all solves.
-    margins: share of its range by which each bound is tightened in each interval, shape
+    margins: fraction of its range by which each bound is tightened in each interval, shape
         (2, N, kinds nv + pairs + values of conditions). clearance: bounded distances, or None.
     tightened: the margins before the last tightening and the excess then, if there was one on this
         grid.
-    multipliers, unmet: of the constraints, and why they cannot be met, or "".
+    multipliers, unmet: of the constraints, and why they cannot be satisfied, or "".
     last: the problem and the motion of the last solve. solved: how it ended, and its objective.
     points: of the central path, with a larger barrier than that of the last solution. at_level:
         whether a solve begins on one. timed: whether the duration is free.
@@ -246,12 +246,12 @@ class BoundedSearch:
             decrease, mu = max(decrease, criteria.decrease), max(ROUND_BARRIER, criteria.barrier)
             criteria = dataclasses.replace(criteria, decrease=decrease, barrier=mu)
             ended = self.minimized(objective, Start(x, z), criteria)
-            share = float(np.clip(decrease**0.5, ROUND_BARRIER, WARM_MU_RANGE[1]))
-            mu = share * ended.outputs.density(objective.bounds.measure)
+            fraction = float(np.clip(decrease**0.5, ROUND_BARRIER, WARM_MU_RANGE[1]))
+            mu = fraction * ended.outputs.density(objective.bounds.measure)
             y, barrier = ended.outputs.y, ended.z
             z = None
             if len(y) == len(barrier.s) == len(objective.bounds.lower):
-                margin = min(share, WARM_START_MARGIN)
+                margin = min(fraction, WARM_START_MARGIN)
                 z = Barrier.central(objective.bounds, y, mu, None, margin, barrier)
             return ended
 
@@ -287,7 +287,7 @@ class BoundedSearch:
         return Start(path, z)
 
     def _solved_under_conditions(self, start: Begun) -> Bounded | None:
-        """A solve whose steps meet the conditions at nodes; None where that fails."""
+        """A solve whose steps satisfy the conditions at nodes; None where that fails."""
         known = self.multipliers or first_multipliers(self.problem, start.x)
         objective = self.objective(known, node_tolerance=NODE_TOLERANCE)
         ended = self.minimized(objective, start, self.remaining_criteria())
@@ -383,7 +383,7 @@ class BoundedSearch:
         return np.concatenate(sides, axis=2) if len(sides) > 1 else sides[0]
 
     def _worst_condition(self, trajectory: Trajectory) -> tuple[float, str]:
-        """The largest excess of a condition, as a share of its scale, and what it is."""
+        """The largest excess of a condition, as a fraction of its scale, and what it is."""
         found = [ConditionBounds(each).worst(trajectory) for each in self.problem.bounds]
         return max(found, default=(-np.inf, ""))
 

@@ -151,7 +151,7 @@ def _without_distances(search: BoundedSearch, guess: DiscretePath) -> Bounded:
 
 
 def _rough_with_constraints(search: BoundedSearch, guess: DiscretePath) -> Bounded:
-    """A rough motion that nearly meets the constraints."""
+    """A rough motion that nearly satisfies the constraints."""
     problem = search.problem
 
     def minimize_round(known: Multipliers, x: DiscretePath, _: float) -> Bounded:

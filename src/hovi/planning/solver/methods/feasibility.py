@@ -37,7 +37,7 @@ SHIFT_LEVEL = 1.0
 SHIFT_LEVELS = 1e-5, 3e-2
 """Least and largest such parameter."""
 WARM_SHIFT = 1e-3
-"""Largest move of an output, as a share of its range, after which a solve begins at a solution."""
+"""Largest move of an output, as a fraction of its range, for a start at the old solution."""
 NEWTON_SHIFT, NEWTON_STEPS = 0.1, 20
 """The same for whole Newton steps, and the maximum number of these."""
 WARM_BARRIER, WARM_DECREASE = 1e-7, 3e-7
@@ -223,12 +223,12 @@ def _solved_warm(search: BoundedSearch, known: Barrier, path: DiscretePath) -> B
 def _solved_from_level(search: BoundedSearch, along: CentralPath, level: float) -> Bounded:
     """Solve from the point of a central path with a barrier as large as a level."""
     problem, other_ends = search.problem, search.near is not None and search.level is None
-    share, point = along.close(level, problem.coordinates) if other_ends else along.at(level)
+    fraction, point = along.close(level, problem.coordinates) if other_ends else along.at(level)
     path = problem.moved(point)
     if along.rows is None:
-        search.rows.refine(path, share)
+        search.rows.refine(path, fraction)
     search.look_around(path)
-    return search.solve_at_level(path, share)
+    return search.solve_at_level(path, fraction)
 
 
 def solved_from(search: BoundedSearch, path: DiscretePath) -> Bounded:
@@ -261,8 +261,8 @@ def _moved_out_of_obstacles(
     depth = wanted.least - float(approach.distance.min())
     stages = int(np.clip(np.ceil(depth / STAGE_DEPTH), 1, MAX_STAGES))
     search.criteria = dataclasses.replace(criteria, max_iterations=STAGE_STEPS)
-    for share in np.arange(1, stages) / stages:
-        least = wanted.least - (1.0 - share) * depth
+    for fraction in np.arange(1, stages) / stages:
+        least = wanted.least - (1.0 - fraction) * depth
         search.clearance = ClearanceOutputs(wanted.distances, least)
         ended = search.solve(Start(path))
         path = ended.x

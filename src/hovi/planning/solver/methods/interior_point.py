@@ -187,8 +187,8 @@ def _unfinished(why: Reason, nit: int, cost: float) -> tuple[Status, str]:
 
 
 def _minimum(search: BoundedSearch, cost: float, excess: float) -> str:
-    share = f" to {excess:.1e} of their ranges" if excess > 0 else ""
-    held = f"limits hold everywhere{share}, on {search.problem.grid.intervals} intervals"
+    fraction = f" to {excess:.1e} of their ranges" if excess > 0 else ""
+    held = f"limits hold everywhere{fraction}, on {search.problem.grid.intervals} intervals"
     return f"a minimum of cost {cost:.10g} after {search.iterations} steps; {held}."
 
 

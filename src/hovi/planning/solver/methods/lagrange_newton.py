@@ -20,7 +20,7 @@ from hovi.planning.solver.answer import Answer
 from hovi.planning.solver.augmented_lagrangian_rounds import (
     FEASIBLE_RESIDUAL,
     FIRST_DECREASE,
-    WARM_TORQUE_SHARE,
+    WARM_TORQUE_FRACTION,
     first_multipliers,
     spurious_sentence,
     unmet_sentence,
@@ -131,7 +131,7 @@ class _Search:
 
         They are those of the minimum up to the path's distance from it.
         """
-        if objective.action.residuals(path).torque_share > WARM_TORQUE_SHARE:
+        if objective.action.residuals(path).torque_fraction > WARM_TORQUE_FRACTION:
             return None
         there = objective.evaluate(path)
         model = objective.model(path, np.zeros_like(there.y))

@@ -27,11 +27,11 @@ MAX_ROUNDS_PER_GRID = 9
 MAX_HALVINGS = 14
 """Maximum number of rounds that halve intervals."""
 HALVING_EXCESS = 0.05
-"""Excess, as a share of the range, above which intervals are halved at once."""
+"""Excess, as a fraction of the range, above which intervals are halved at once."""
 NEIGHBOR_EXCESS = 0.01
-"""Excess, as a share of the range, above which an interval is halved along with the worst."""
+"""Excess, as a fraction of the range, above which an interval is halved along with the worst."""
 WARM_EXCESS = 0.2
-"""Excess, as a share of the range, up to which the motion is the guess on halved intervals; one
+"""Excess, as a fraction of the range, up to which the motion is the guess on halved intervals; one
 that exceeds limits further between the points is an artifact of the coarse grid."""
 TIGHTENING_FACTOR = 1.5
 """Ratio of tightening and excess; above 1, since the next motion uses the range that is left."""
@@ -42,12 +42,12 @@ SECANT_FACTOR = 1.2
 EXTRA_TIGHTENING = 5.0
 """Additional tightening, in tolerances, to end the rounds early."""
 UNUSED_MARGIN = 1e-3
-"""Unused share of a range above which a tightened bound is relaxed again."""
+"""Unused fraction of a range above which a tightened bound is relaxed again."""
 TIMED_STEPS = 25
 """Maximum number of steps with tightened bounds where the duration moves, too: from there on halved
 intervals take fewer."""
 MAX_MARGIN = 0.45
-"""Maximum share of its range by which a bound is tightened."""
+"""Maximum fraction of its range by which a bound is tightened."""
 
 
 def tightened(search: BoundedSearch, ended: Bounded) -> tuple[Bounded, str, float]:
@@ -104,8 +104,8 @@ def _solved_tighter(search: BoundedSearch, ended: Bounded, sides: Array) -> Boun
     search.tightened = search.margins, sides
     search.margins = np.clip(search.margins + tighter + looser, 0.0, MAX_MARGIN)
     objective = search.objective(search.multipliers)
-    share = float(np.clip(1e-2 * float(sides.max()), *WARM_MU_RANGE))
-    mu = share * ended.outputs.density(objective.bounds.measure)
+    fraction = float(np.clip(1e-2 * float(sides.max()), *WARM_MU_RANGE))
+    mu = fraction * ended.outputs.density(objective.bounds.measure)
     y, barrier = objective.outputs(ended.x).y, ended.z
     z = None
     if len(y) == len(barrier.s):

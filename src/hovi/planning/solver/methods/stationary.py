@@ -32,8 +32,8 @@ ROUNDING_LENGTH = 1e-14
 """The same below which no further step is taken."""
 DECREASE = 1e-4
 """Decrease of the gradient's norm, relative to that of a full Newton step, that a step needs."""
-LEAST_SHARE = 1e-6
-"""Smallest share of a Newton step that is tried."""
+LEAST_FRACTION = 1e-6
+"""Smallest fraction of a Newton step that is tried."""
 METRIC_FLOOR = 1e-12
 """Added to the metric, relative to its largest entry: where both ends are free it is singular."""
 
@@ -118,15 +118,15 @@ class _Search:
         length = self.objective.relative_size(self.x, step, model)
         if not np.isfinite(length):
             return Reason.DIVERGED
-        size, share = self._norm(gradient), 1.0
-        while share >= LEAST_SHARE:
-            trial = self.objective.retract(self.x, share * step, model)
-            if self._norm(self._gradient(trial, model)) <= (1.0 - DECREASE * share) * size:
+        size, fraction = self._norm(gradient), 1.0
+        while fraction >= LEAST_FRACTION:
+            trial = self.objective.retract(self.x, fraction * step, model)
+            if self._norm(self._gradient(trial, model)) <= (1.0 - DECREASE * fraction) * size:
                 self.x, self.steps = trial, self.steps + 1
-                return Reason.STATIONARY if share * length <= ROUNDING_LENGTH else None
+                return Reason.STATIONARY if fraction * length <= ROUNDING_LENGTH else None
             if length <= CONVERGED_LENGTH:
                 return Reason.STATIONARY
-            share /= 2
+            fraction /= 2
         return Reason.DIVERGED
 
     def _gradient(self, x: DiscretePath, model: BandModel) -> Array:

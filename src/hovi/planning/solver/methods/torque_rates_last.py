@@ -26,7 +26,7 @@ from hovi.system.deadline import Deadline
 Solve = Callable[[TrajectoryProblem, Guess, Criteria], Answer]
 TORQUE_RATE = "torque_rate"
 NEAR_A_RATE = 0.02
-"""Distance of a guess from the limits on the torque rate, as a share of their range, below which
+"""Distance of a guess from the limits on the torque rate, as a fraction of their range, below which
 they are imposed at once where the guess is the motion of a similar problem."""
 
 
@@ -60,7 +60,7 @@ def with_torque_rates_last(
 
 
 def _margin(problem: TrajectoryProblem, limits: Limits, path: DiscretePath) -> float:
-    """Least distance of a path's torque rates from their limits, as a share of the range."""
+    """Least distance of a path's torque rates from their limits, as a fraction of the range."""
     alone = limits.without(*(kind for kind in KINDS if kind != TORQUE_RATE))
     return float(closeness(problem.trajectory(path), alone).min())
 

@@ -39,15 +39,15 @@ Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]
 Mask = npt.NDArray[np.bool_]
 
-ROUNDED_SHARE, LEAST_ROUNDING, MOST_ROUNDING = 0.1, 2e-5, 1e-3
-"""Size by which the shapes of a row are rounded, as a share of what the row is above its bound, and
-the least and the largest, in [m]: see Distances.values."""
+ROUNDED_FRACTION, LEAST_ROUNDING, MOST_ROUNDING = 0.1, 2e-5, 1e-3
+"""Size by which the shapes of a row are rounded, as a fraction of what the row is above its bound,
+and the least and the largest, in [m]: see Distances.values."""
 SHARPENED = 0.5
 """Ratio of such a size to the present one below which it takes its place."""
 MOST_INFLATION = 10.0
 """Bound of what a rounded distance is shorter by, relative to the size."""
 WEIGHT = 0.1
-"""Weight of a row in a barrier, as a share of the interval."""
+"""Weight of a row in a barrier, as a fraction of the interval."""
 NEARBY = 0.3
 """Distance up to which a row is near a new one, relative to the interval."""
 GUARD = 0.05
@@ -345,4 +345,4 @@ class ClearanceRows:
 
 def _rounding_of(y: Array) -> Array:
     """Sizes by which the shapes of rows are rounded, in [m]. y: of the rows, (E,)."""
-    return np.clip(ROUNDED_SHARE * DISTANCE_SCALE * y, LEAST_ROUNDING, MOST_ROUNDING)
+    return np.clip(ROUNDED_FRACTION * DISTANCE_SCALE * y, LEAST_ROUNDING, MOST_ROUNDING)

@@ -30,9 +30,9 @@ the control points are nearer to the curve than rounding errors."""
 
 
 def exceeds(motion: Trajectory, limits: Limits, limited: LimitedCoordinates, most: float) -> bool:
-    """Whether a limited coordinate is over a bound anywhere by more than a share of its range.
+    """Whether a limited coordinate is over a bound anywhere by more than a fraction of its range.
 
-    limited: the coordinates of the limits that are polynomials. most: the share.
+    limited: the coordinates of the limits that are polynomials. most: the fraction.
     """
     orders = map(int, np.unique(limited.order))
     found = (each for order in orders for each in _over_bounds(motion, limits, limited, order))
@@ -42,7 +42,7 @@ def exceeds(motion: Trajectory, limits: Limits, limited: LimitedCoordinates, mos
 def _over_bounds(
     motion: Trajectory, limits: Limits, limited: LimitedCoordinates, order: int
 ) -> Iterator[Array]:
-    """Control points over the upper and below the lower bounds, as shares, (M, d + 1) each."""
+    """Control points over the upper and below the lower bounds, as fractions, (M, d + 1) each."""
     own = np.flatnonzero(limited.order == order)
     whole = _control_points(motion, order, np.zeros(1), np.ones(1))[:, 0]
     points = whole[:, :, limited.joint[own]].transpose(0, 2, 1)

@@ -1,7 +1,7 @@
 """Whether a motion that was planned without self-collision collides with itself.
 
 Meshes are their convex hulls, and robots without an SRDF have links whose hulls always overlap. So
-what is told is a pair of links that the motion brings into each other: apart at one time, and
+what is reported is a pair of links that the motion brings into each other: apart at one time, and
 overlapping at another.
 """
 
@@ -23,7 +23,7 @@ from hovi.system.deadline import OutOfTimeError
 SAMPLES = 129
 """Number of samples of a motion that are looked at."""
 DEPTH = 1e-3
-"""Overlap, in [m], from which a pair is told: hulls are a little larger than links."""
+"""Overlap, in [m], from which a pair is reported: hulls are a little larger than links."""
 
 
 def self_collision_sentence(motion: Trajectory) -> str:

@@ -27,7 +27,7 @@ Array = npt.NDArray[np.float64]
 BRAKES = "Instead, this motion brakes to rest from the start, within the limits."
 """What is reported of such a motion."""
 FIRST, TIMES = 0.02, 7
-"""First time t_s, as a share of the motion, and the number of times, each twice the one before."""
+"""First time t_s, as a fraction of the motion, and the number of times, each twice the last."""
 
 
 def braking(problem: TrajectoryProblem) -> tuple[TrajectoryProblem, DiscretePath] | None:

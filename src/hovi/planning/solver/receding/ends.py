@@ -40,8 +40,8 @@ KEPT_OPTIONS = (
 )
 """Options of `plan` that `replan` and `advance` keep, or have no use for."""
 ROOM = 5e-7
-"""Distance of a start from a limit that it is at, as a share of the range: without any there would
-be no motion strictly within the limits."""
+"""Distance of a start from a limit that it is at, as a fraction of the range: without any there
+would be no motion strictly within the limits."""
 
 
 def is_near(goal: FrameGoal, problem: TrajectoryProblem, path: DiscretePath) -> bool:

@@ -1,7 +1,7 @@
-"""What comes back when time runs out: a motion that meets ends and limits, or the last motion.
+"""What comes back when time runs out: a motion that satisfies ends and limits, or the last motion.
 
-A motion meets them to 1e-6: of the ranges of limits, in [rad] and [m], and relative to the largest
-torque where joints are passive.
+A motion satisfies them to 1e-6: of the ranges of limits, in [rad] and [m], and relative to the
+largest torque where joints are passive.
 """
 
 from __future__ import annotations
@@ -20,7 +20,8 @@ if TYPE_CHECKING:
 
 
 def meets(problem: TrajectoryProblem, path: DiscretePath) -> bool:
-    """Whether a path with the problem's ends meets its limits, distances and equations everywhere.
+    """Whether a path with the problem's ends satisfies its limits, distances and equations
+    everywhere.
 
     Raises OutOfTimeError when the deadline in force passes before that is known.
     """

@@ -24,7 +24,7 @@ from hovi.system.dataclass import dataclass
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]
 
-LEAST_SHARE = 0.05
+LEAST_FRACTION = 0.05
 """Length of the rest of an interval, relative to the next one, below which both become one."""
 MORE_POINTS = 2
 """Gauss points in a part of an interval, beyond half the degree of what is integrated."""
@@ -50,7 +50,7 @@ class Remainder:
         """
         first = int(np.searchsorted(whole.t, time, side="right")) - 1
         if first + 1 < whole.intervals and first + 1 not in kept:
-            short = whole.t[first + 1] - time < LEAST_SHARE * whole.steps[first + 1]
+            short = whole.t[first + 1] - time < LEAST_FRACTION * whole.steps[first + 1]
             first += int(short)
         return cls(whole, time, first)
 
@@ -153,14 +153,14 @@ class Remainder:
         for number in range(self._begun, self.first + 1):
             h, low = grid.steps[number], max(self.time, grid.t[number])
             t = low + (grid.t[number + 1] - low) * (x + 1) / 2
-            share = (grid.t[number + 1] - low) / length
+            fraction = (grid.t[number + 1] - low) / length
             curve = jet_rows(np.minimum((t - grid.t[number]) / h, 1.0), k, r)[:, k] / h**k
             at = 1.0 - (end - t) / length
             ends = gamma(k) @ end_basis(at, k)
             tops = jet_rows(at, k, r)[:, k, 2 * k - 1 :].T  # orthonormal
             tops[own:] = 0.0
             basis = np.concatenate([ends, tops])
-            matrices.append(share * (basis * (w / 2)) @ curve)
+            matrices.append(fraction * (basis * (w / 2)) @ curve)
         return matrices
 
     def _projected(self, path: DiscretePath, problem: TrajectoryProblem) -> DiscretePath:

@@ -18,7 +18,7 @@ class PassiveJoints(Requirement):
 
     def violation(self, motion: Trajectory) -> str:
         """The largest torque of a passive joint, relative to that of any joint."""
-        share = ActionObjective(self.problem).residuals(motion.path).torque_share
+        share = ActionObjective(self.problem).residuals(motion.path).torque_fraction
         if share <= MET:
             return ""
         joints = passive_joints(self.problem)
