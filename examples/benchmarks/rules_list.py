@@ -798,18 +798,18 @@ _rule(
     "False",
 )
 _rule(
-    "legs between seams",
-    "A sequence among obstacles is solved leg by leg first.",
-    "_by_legs",
+    "subproblems between seams",
+    "A sequence among obstacles is solved between its seams first.",
+    "_by_subproblems",
     "subproblems_of(search.problem)",
     "[]",
 )
 _rule(
-    "second level for legs",
-    "Where joining legs fails, it is tried with a larger barrier.",
-    "_by_legs",
-    "LEG_LEVELS if legs else ()",
-    "LEG_LEVELS[:1] if legs else ()",
+    "second level for subproblems",
+    "Where joining them fails, it is tried with a larger barrier.",
+    "_by_subproblems",
+    "SUBPROBLEM_LEVELS if subproblems else ()",
+    "SUBPROBLEM_LEVELS[:1] if subproblems else ()",
 )
 _rule(
     "push out of obstacles",
