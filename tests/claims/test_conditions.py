@@ -289,6 +289,20 @@ REFUSED: dict[str, tuple[Callable[[], Any], str]] = {
 }
 
 
+def test_the_condition_of_the_documentation_holds(capsys: pytest.CaptureFixture[str]) -> None:
+    """The distance of two frames, a limit on the power and a height, in one plan."""
+    page = (Path(__file__).resolve().parents[2] / "docs" / "design.md").read_text()
+    section = page.split("## Add a condition")[1]
+    known: dict[str, Any] = {}
+    exec(section.split("```python\n")[1].split("```")[0], known)
+    motion, robot = known["motion"], known["scene"].robot
+    assert motion.success, motion.message
+    q = motion.trajectory.configurations(np.linspace(0.0, 1.5, 1001))
+    poses = [[robot.frame_pose(name, x)[:3, 3] for x in q] for name in ("tool0", "base_link")]
+    assert np.linalg.norm(np.subtract(*poses), axis=1).min() >= 0.25 - 1e-6
+    assert "frames" in capsys.readouterr().out
+
+
 @pytest.mark.parametrize("what", REFUSED)
 def test_what_cannot_be_asked_is_refused_in_one_sentence(scene: hovi.Scene, what: str) -> None:
     make, sentence = REFUSED[what]

@@ -50,24 +50,4 @@ class AtPoints:
     """At all times: bounds at the quadrature points, tightened where they do not hold between."""
 
 
-@dataclass(frozen=True)
-class ControlPoints:
-    """At all times: bounds on the control points of polynomials, which no value exceeds."""
-
-
-@dataclass(frozen=True)
-class Exchange:
-    """At all times: bounds at the instants at which pairs come near, which are looked for."""
-
-
-@dataclass(frozen=True)
-class Along:
-    """At all times: as many moments of an interval vanish as its curve has coefficients."""
-
-
-@dataclass(frozen=True)
-class AtEnds:
-    """At the start and at the goal."""
-
-
-Where = AtNode | AtTimes | AtPoints | ControlPoints | Exchange | Along | AtEnds
+Where = AtNode | AtTimes | AtPoints
