@@ -100,11 +100,13 @@ def constrained_status(
     if reason and np.isfinite(cost):
         return Status.INFEASIBLE, f"{reason}."
     status, message = status_of(problem, ended, cost, nit, n_neg)
+    if status is Status.MINIMUM:
+        return status, message
     residuals = ActionObjective(problem).residuals(ended.x)
-    if status is not Status.MINIMUM and not are_met(residuals):
-        sentence = unmet_sentence(problem, ended.x, residuals)
-        message = f"{message} So far, {sentence.partition(';')[0]}."
-    return status, message
+    if are_met(residuals):
+        return status, message
+    sentence = unmet_sentence(problem, ended.x, residuals)
+    return status, f"{message} So far, {sentence.partition(';')[0]}."
 
 
 def with_offset(report: Report | None, done: int) -> Report | None:
