@@ -18,8 +18,6 @@ from typing import Any
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-import hovi
-
 
 @cache
 def compile_modules() -> None:
@@ -28,6 +26,8 @@ def compile_modules() -> None:
     An editable installation compiles them when they are first imported, and with
     PYTHONDONTWRITEBYTECODE they are compiled in every process.
     """
+    import hovi  # not by those who only print tables, and import hovi from elsewhere
+
     compileall.compile_dir(Path(hovi.__file__).parent, quiet=2)
 
 

@@ -250,6 +250,8 @@ def preload() -> None:
     import scipy.linalg
     import scipy.optimize  # noqa: F401
 
+    assert "hovi" not in sys.modules, "the tests would not import it from the copy of the tree"
+
 
 def tested(tree: Path, tests: list[str], limit: float, log: Path) -> str:
     """What the tests say: "passed", "failed" or "timeout"."""
