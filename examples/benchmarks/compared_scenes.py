@@ -100,7 +100,7 @@ def missed_goal(world: World, goal: dict[str, Any], q: Array) -> str:
 
 
 def asked_of_task(world: World, data: dict[str, Any], motion: Any) -> Asked:
-    """What a task asks of a motion beside distances."""
+    """What a task asks of a motion besides distances."""
     limits = hovi.as_limits(motion.robot, data.get("limits", "urdf"))
     stops: list[tuple[float, Any, Any]] = [(0.0, None, np.zeros(1)), (np.inf, None, np.zeros(1))]
     for number, end in enumerate((data["start"], data["goal"])):

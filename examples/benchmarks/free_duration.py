@@ -53,7 +53,7 @@ def timed(
 
 
 def scene_row(name: str, grid: str) -> Row:
-    """A bundled scene; that of a Panda without limits with rotors, without which it whirls."""
+    """A bundled scene; that of a Panda without limits with rotors, without which it spins."""
     weight, options = SCENES[name]
     task = hovi.load_task(hovi.example(name))
     scene = task.scene

@@ -73,7 +73,7 @@ def work(kind: str, seed: int, numbers: range) -> None:
 
 
 def watch(kind: str, seed: int, numbers: range) -> Iterator[Result]:
-    """The results of a share of the inputs, restarting the process after a crash or a hang."""
+    """The results of a fraction of the inputs, restarting the process after a crash or a hang."""
     while numbers:
         share = [kind, str(seed), str(numbers.start), str(numbers.stop), str(numbers.step)]
         command = [sys.executable, "-W", "error", __file__, "--work", *share]

@@ -108,7 +108,7 @@ def _collocation(problem: hovi.TrajectoryProblem, samples: tuple[float, ...]) ->
 
 
 def _excess(problem: hovi.TrajectoryProblem, method: Collocation, w: Array) -> float:
-    """Largest excess over a limit at many samples, as a share of its range."""
+    """Largest excess over a limit at many samples, as a fraction of its range."""
     s = np.linspace(0.0, 1.0, CHECKS)
     dense = Collocation(
         with_points(method.table, s, np.zeros(CHECKS)),

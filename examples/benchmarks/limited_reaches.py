@@ -38,7 +38,7 @@ import hovi
 APART = {"self_collision": False}
 SETTINGS = {"16 intervals": {"intervals": 16, **APART}, "defaults": APART}
 MAX_EXCESS = 1e-6
-"""Largest excess of a motion that holds its limits, as a share of their ranges."""
+"""Largest excess of a motion that holds its limits, as a fraction of their ranges."""
 
 
 @dataclass(frozen=True)

@@ -183,7 +183,7 @@ def measure_box_fddp(scene: str, move: float, laps: int, python: str) -> dict[st
 
 
 def _speed_excess(answers: list[dict[str, object]], limits: hovi.Limits) -> float:
-    """Largest excess over a velocity limit at the knots, as a share of its range."""
+    """Largest excess over a velocity limit at the knots, as a fraction of its range."""
     v = np.abs([answer["v"] for answer in answers]).max(axis=(0, 1), initial=0.0)
     return float(np.max((v - limits.upper[1]) / (2 * limits.upper[1])))
 

@@ -1,4 +1,4 @@
-"""How soon a mistake in a task is told: twenty tasks, each by a `hovi plan` process of its own.
+"""How soon a mistake in a task is reported: twenty tasks, each by a `hovi plan` process of its own.
 
 The processor time is that of the whole process, its start included, until the sentence is printed;
 the least of several runs. A plan that goes on after a warning is ended then.
@@ -80,7 +80,7 @@ MISTAKES: dict[str, tuple[dict[str, Any], str]] = {
         "has no motor that a URDF could name",
     ),
     "gravity that is not named": ({"effects": {}}, "Gravity is left out"),
-    "newtons beside newton metres": (
+    "newtons next to newton metres": (
         CART | {"goal": {"q": [0.2, 0.1]}},
         "adds up squares of forces in N",
     ),

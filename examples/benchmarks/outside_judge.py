@@ -20,11 +20,11 @@ Array = npt.NDArray[np.float64]
 MAX_DIFFERENCE = 1e-2
 """Largest relative difference of a cost and the integral along the curve."""
 MAX_EXCESS = 2e-6
-"""Largest accepted excess over a limit, as a share of its range: twice hovi's own tolerance."""
+"""Largest accepted excess over a limit, as a fraction of its range: twice hovi's own tolerance."""
 MAX_MISS = 2e-6
 """Largest accepted distance from a state that is asked for, in [rad] and, per second, in [rad]."""
 MAX_PASSIVE = 2e-2
-"""Largest accepted torque of passive joints along the curve, as a share of all torques."""
+"""Largest accepted torque of passive joints along the curve, as a fraction of all torques."""
 MAX_LED_BACK = 0.02
 """Share of a limit's range from which a start may be led back."""
 GAUSS_POINTS, SAMPLES = 48, 20_001
@@ -120,7 +120,7 @@ def integral(model: pin.Model, motion: Any) -> float:
 
 
 def excess(y: Array, lower: Array, upper: Array) -> float:
-    """Largest excess of samples (M, nv) over bounds, as a share of a limit's range.
+    """Largest excess of samples (M, nv) over bounds, as a fraction of a limit's range.
 
     lower, upper: shape (nv,), or (M, nv) with ranges of the first row. Joints without limits are
     left out.

@@ -29,7 +29,7 @@ Result = TypeVar("Result")
 
 ARMS = ("ur5", "panda", "z1", "kinova", "xarm7")
 HOLDING_SHARE = 0.9
-"""Largest torque that holds a start or goal, as a share of its limit."""
+"""Largest torque that holds a start or goal, as a fraction of its limit."""
 DURATIONS = (1.5, 2.0)
 """Range of the durations, in times at the velocity limits."""
 SAMPLES = 50_000
@@ -96,13 +96,13 @@ def rnea(model: pin.Model, q: Array, v: Array, a: Array) -> Array:
 
 
 def largest_excess(scene: hovi.Scene, motion: hovi.Trajectory, limits: hovi.Limits) -> float:
-    """Largest excess over a limit at SAMPLES times, as a share of its range."""
+    """Largest excess over a limit at SAMPLES times, as a fraction of its range."""
     x = motion.sample(np.linspace(0.0, motion.duration, SAMPLES))
     return outside(scene, limits, x.q, x.v, x.a)
 
 
 def outside(scene: hovi.Scene, limits: hovi.Limits, q: Array, v: Array, a: Array) -> float:
-    """Largest excess of q, v, a or the torques at M points, as a share of a limit's range."""
+    """Largest excess of q, v, a or the torques at M points, as a fraction of a limit's range."""
     worst = 0.0
     for row, y in enumerate((q, v, a, rnea(torque_model(scene), q, v, a))):
         low, high = limits.lower[row], limits.upper[row]

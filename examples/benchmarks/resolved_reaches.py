@@ -43,7 +43,7 @@ class Reach:
     """The result of one reach.
 
     nit: steps of the optimiser. seconds: of CPU. denied: why the success is denied, or "".
-    whirl: largest velocity of a joint, over (half a turn + its distance) / T.
+    spin: largest velocity of a joint, over (half a turn + its distance) / T.
     """
 
     arm: str
@@ -53,12 +53,12 @@ class Reach:
     nit: int
     seconds: float
     denied: str
-    whirl: float
+    spin: float
     message: str
 
 
 def beyond_limits(scene: hovi.Scene, trajectory: hovi.Trajectory) -> float:
-    """Largest excess over a limit, as a share of its range; unlimited joints are left out."""
+    """Largest excess over a limit, as a fraction of its range; unlimited joints are left out."""
     robot = scene.robot
     motion = trajectory.sample(np.linspace(0.0, trajectory.duration, SAMPLES))
     tau = torques(oracle_model(robot.model), motion)
@@ -115,11 +115,11 @@ def measure(arm: str, limits: str, number: int, count: int, seed: int) -> Reach:
     denied = denial(scene, limits, plan) if plan.success else ""
     velocity = np.abs(plan.trajectory.sample(np.linspace(0, T, 2001)).v).max(axis=0)
     unit = (np.pi + np.abs(scene.robot.difference(*ends))) / T
-    whirl = float(np.max(velocity / unit))
+    spin = float(np.max(velocity / unit))
     status = str(plan.status)
     text = f"{arm} {limits} {number}: T {T:.2f} {status} {plan.nit} steps {seconds:.2f} s"
-    print(f"{text} whirl {whirl:.1f} {denied}", file=sys.stderr, flush=True)
-    return Reach(arm, limits, number, status, plan.nit, seconds, denied, whirl, plan.message)
+    print(f"{text} spin {spin:.1f} {denied}", file=sys.stderr, flush=True)
+    return Reach(arm, limits, number, status, plan.nit, seconds, denied, spin, plan.message)
 
 
 def main() -> None:

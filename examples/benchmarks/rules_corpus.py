@@ -23,7 +23,7 @@ Problem = Callable[[int], hovi.Solution]
 
 TASKS = Path(__file__).resolve().parents[2] / "models" / "tasks"
 NUDGE = 1e-9
-"""Largest move of a start, as a share of its range."""
+"""Largest move of a start, as a fraction of its range."""
 PROBLEMS: dict[str, Problem] = {}
 SCREENING: list[str] = []
 """Names of those that take a few seconds together and reach most rules."""
@@ -67,7 +67,7 @@ def _given(name: str) -> hovi.Scene:
 
 
 def _ends(robot: hovi.Robot, seed: int, share: float) -> tuple[Array, Array]:
-    """Two configurations in a share of the ranges, or of 2.5 rad to both sides."""
+    """Two configurations in a fraction of the ranges, or of 2.5 rad to both sides."""
     rng = np.random.default_rng(seed)
     low, high = np.maximum(robot.lower, -2.5), np.minimum(robot.upper, 2.5)
     mid, half = (low + high) / 2, (high - low) / 2 * share

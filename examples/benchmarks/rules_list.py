@@ -1168,7 +1168,7 @@ _rule(
     "few steps where a joint spins",
     "A solve that follows a spinning motion has few steps.",
     "_Search._solved",
-    "last.whirl is not None",
+    "last.spin is not None",
     "False",
 )
 _rule(
@@ -1190,7 +1190,7 @@ _rule(
     "end where a joint spins",
     "A refinement ends early where a joint spins too fast.",
     "_Search._stop_reason",
-    "whirling.is_hopeless(grids=grids, alone=alone, nearly_resolved=nearly)",
+    "spinning.is_hopeless(grids=grids, alone=alone, nearly_resolved=nearly)",
     "False",
 )
 _at("refinement", "planning.refinement.next_grid")

@@ -13,7 +13,7 @@ PACKAGES = {
     *("optimize", "planning", "conditions", "program", "kkt", "resolve", "search", "motion"),
     "solver",
 }
-"""Packages of hovi in which motions are sought, wherever they are put."""
+"""Packages of hovi that search for motions, wherever they are put."""
 
 
 def solving_statements(checkout: Path) -> int:

@@ -29,7 +29,7 @@ from toppra.constraint import DiscretizationType, JointTorqueConstraint, JointVe
 Array = npt.NDArray[np.float64]
 
 RESOLUTION = 0.005
-"""Distance between configurations that are checked, as a share of the space's extent."""
+"""Distance between configurations that are checked, as a fraction of the space's extent."""
 EXTRA = 2e-3
 """Clearance beyond the margin that the path keeps, since the spline through it cuts corners."""
 PATH_POINTS = 60

@@ -25,7 +25,7 @@ ARMS = {
 }
 """Robots of example-robot-data, with a pattern of the joints that move; all others are locked."""
 HOLDING_SHARE = 0.9
-"""Largest torque that holds a start or goal, as a share of its limit."""
+"""Largest torque that holds a start or goal, as a fraction of its limit."""
 
 
 def load(arm: str) -> hovi.Scene:

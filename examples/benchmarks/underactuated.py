@@ -205,7 +205,7 @@ def main() -> None:
     rows = [row for scene in SCENES for row in alone(compare, scene)]
     columns = ["scene, solver", "steps", "ratio", "CPU ms", "ratio", "cost", "ratio", "status"]
     print_table([*columns, "passive torque"], rows)
-    print("Passive torque at the quadrature points, as a share of the largest torque; for Ipopt")
+    print("Passive torque at the quadrature points, as a fraction of the largest torque; for Ipopt")
     print(
         "its tolerance. The third rows: within Ipopt's time, with more starts, the lowest cost.\n"
     )

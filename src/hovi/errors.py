@@ -43,7 +43,7 @@ class ChartError(InputError):
 
 
 class UnreachableError(HoviError):
-    """No configuration meets a goal; `q` is the one that comes nearest to it, shape (nq,)."""
+    """No configuration reaches a goal; `q` is the one that comes nearest to it, shape (nq,)."""
 
     def __init__(self, sentence: str = "", q: Any = None) -> None:
         super().__init__(sentence)

@@ -122,10 +122,10 @@ def test_invalid_input_is_refused_and_not_tried_again(arm_scene: Scene) -> None:
 
 
 @pytest.mark.long
-def test_a_wrist_that_whirls_is_measured_from_heavy_rotors() -> None:
+def test_a_wrist_that_spins_is_measured_from_heavy_rotors() -> None:
     scene = Scene(load_robot("ur10"), [Gravity()])
     start, goal = UR10_REACH
     task = Task(scene, State(start), State(goal), 1.114, PlanOptions(limits="none"))
     found = reference(task, seconds=600.0)
-    assert "whirls at up to" in found.notes[0]
+    assert "spins at up to" in found.notes[0]
     assert found.resolved.uncertainty.cost < 1e-9

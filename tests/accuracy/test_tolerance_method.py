@@ -109,7 +109,7 @@ def test_the_default_is_a_star_in_every_panel_of_warm_times(free: Diagram) -> No
 
 
 def test_a_default_without_a_star_is_told(free: Diagram) -> None:
-    far = dataclasses.replace(default_of(free), minimum=False, message="it whirls")
+    far = dataclasses.replace(default_of(free), minimum=False, message="it spins")
     diagram = dataclasses.replace(free, default=far)
     figure = work_precision_figure(diagram)
     told = figure.get_suptitle()

@@ -83,7 +83,7 @@ def found(robot: str, seed: int) -> hovi.Solution | None:
 
 
 def excess(solution: hovi.Solution, within: dict[str, np.ndarray]) -> float:
-    """The largest excess over any bound, as a share of its range, but for what is excused."""
+    """The largest excess over any bound, as a fraction of its range, but for what is excused."""
     motion = solution.trajectory
     t = np.linspace(0.0, motion.duration, SAMPLES)
     sample, worst = motion.sample(t), -np.inf

@@ -1,4 +1,4 @@
-"""A limit may be a share of that of the robot, "50 %", wherever limits are given."""
+"""A limit may be a fraction of that of the robot, "50 %", wherever limits are given."""
 
 from __future__ import annotations
 

@@ -43,7 +43,7 @@ def known(name: str) -> dict[str, np.ndarray]:
 
 
 def assert_same(found: np.ndarray, expected: np.ndarray, share: float = 1e-9) -> None:
-    """Equal up to a share of the largest number."""
+    """Equal up to a fraction of the largest number."""
     np.testing.assert_allclose(found, expected, rtol=0, atol=share * np.abs(expected).max())
 
 

@@ -1,4 +1,4 @@
-"""Weights by effort limits: torques and forces count as shares of their limits."""
+"""Weights by effort limits: torques and forces count as fractions of their limits."""
 
 from __future__ import annotations
 

@@ -123,7 +123,7 @@ def test_a_step_found_by_shorter_steps_is_symplectic(seed: int) -> None:
 
 
 def test_a_flow_whose_steps_have_several_solutions_follows_the_motion(two_link: Robot) -> None:
-    """A whirling arm: the solution next to the last curve jumps to 3000 rad/s at t = 1.98 s."""
+    """A spinning arm: the solution next to the last curve jumps to 3000 rad/s at t = 1.98 s."""
     L = Scene(two_link, [Gravity()]).effort_lagrangian()
     x, p = legendre(L, *0.1 * np.random.default_rng(0).normal(size=(4, 2)))
     fine = flow(SchemeLagrangian(L, galerkin(2), 0.0025), x, p, 840, force=True)

@@ -56,7 +56,7 @@ def minima(solutions: Sequence[Solution], *most: float) -> Outcome:
 def stationary(solutions: Sequence[Solution]) -> Outcome:
     """Whether all are minima of the discrete action, those included that their grid cannot carry.
 
-    A light link whirls: no grid resolves that, and the status says so.
+    A light link spins: no grid resolves that, and the status says so.
     """
     told = (Status.MINIMUM, Status.UNRESOLVED)
     return Outcome(summary(solutions), all(s.status in told and s.n_neg == 0 for s in solutions))

@@ -27,7 +27,7 @@ class Budget(Deadline):
         return min(self.spent / self.seconds, 1.0)
 
     def left_of(self, share: float) -> float:
-        """Remaining time of a share of the budget, at least 0, in [s]."""
+        """Remaining time of a fraction of the budget, at least 0, in [s]."""
         return max(share * self.seconds - self.spent, 0.0)
 
     def allows(self, seconds: float, share: float = 1.0) -> bool:

@@ -91,7 +91,7 @@ def find_reference(task: Task, budget: Budget, progress: Progress) -> Reference:
 def _require_usable(found: Solution, unresolved: bool) -> None:
     """Raise UnmeasurableError unless the motion is a minimum, or unresolved if that is allowed.
 
-    `plan` trusts no grid with a joint that whirls; whether one resolves it is then found out here.
+    `plan` trusts no grid with a joint that spins; whether one resolves it is then found out here.
     """
     raise_if_interrupted()
     usable = (Status.MINIMUM, Status.UNRESOLVED) if unresolved else (Status.MINIMUM,)

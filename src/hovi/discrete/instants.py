@@ -151,7 +151,7 @@ class InstantBatch:
 
     @cached_property
     def contraction_weights(self) -> Array:
-        """The weights as shares of the intervals, shape (E,)."""
+        """The weights as fractions of the intervals, shape (E,)."""
         return np.asarray(self.barrier_weights / self.h)
 
     def add(self, parts: Array, sums: Array) -> None:

@@ -42,8 +42,8 @@ class EffortWeight(Effect):
     matrix: R instead, nv rows of nv numbers or formulas of q["joint"], v["joint"], a["joint"] and
         t; symmetric, and positive semidefinite.
     from_urdf: use R = 1 / limit^2 of the URDF's effort limits instead, which makes torques and
-        forces comparable: each counts as a share of its limit. A joint without a limit has weight
-        0.
+        forces comparable: each counts as a fraction of its limit. A joint without a limit has
+        weight 0.
     """
 
     weight: JointValues | None = None

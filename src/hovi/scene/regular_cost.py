@@ -26,7 +26,7 @@ def require_regular(
     (C_taua X)^T + X^T (V_aa + C_aa) X with X = M^-1, and has to be invertible
     [ColomboFerraroMartin2016, section 2]. In the rounding of d2 L~/da2 = M W M a weight of zero
     might be lost, so that W is computed from its parts.
-    Where torques cost nothing, W = V_aa + C_aa, which needs no inertia.
+    Where torques have no cost, W = V_aa + C_aa, which needs no inertia.
 
     lagrangian: of the robot. active: whether each coordinate has a motor, shape (nv,).
     """

@@ -274,7 +274,7 @@ class Scene:
         return None if C is None else RunningCostTerm(columns, tau, C, self.compile, space)
 
     def _cost_of(self, tau: ca.SX) -> ca.SX | None:
-        """C(q, v, a, tau, t): what is left of a passive joint's torque costs nothing."""
+        """C(q, v, a, tau, t): what is left of a passive joint's torque has no cost."""
         return self.terms.running_cost(ca.DM(np.where(self._is_passive, 0.0, 1.0)) * tau)
 
     def _derivatives(self) -> str:

@@ -51,7 +51,7 @@ def pictures_of(path: Path) -> tuple[list[Any], list[int]]:
 
 
 def changed(one: Any, other: Any) -> float:
-    """The share of pixels that differ visibly."""
+    """The fraction of pixels that differ visibly."""
     return float((np.abs(one - other).max(axis=2) > 40).mean())
 
 

@@ -50,7 +50,7 @@ def test_its_torques_are_those_of_the_payload(
 
 
 def test_a_homogeneous_body_has_the_inertia_of_its_points() -> None:
-    """Of 200,000 random points in the two shapes, each with the same share of the mass."""
+    """Of 200,000 random points in the two shapes, each with the same fraction of the mass."""
     random = np.random.default_rng(0)
     box = random.uniform(-0.5, 0.5, (200_000, 3)) * [0.1, 0.06, 0.2] + [0.0, 0.01, 0.0]
     around = random.uniform(-0.02, 0.02, (200_000, 2))

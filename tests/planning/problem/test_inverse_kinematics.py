@@ -1,4 +1,4 @@
-"""Configurations in which a frame meets its goal: all, within limits, clear of obstacles."""
+"""Configurations in which a frame reaches its goal: all, within limits, clear of obstacles."""
 
 from __future__ import annotations
 

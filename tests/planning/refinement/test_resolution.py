@@ -347,7 +347,7 @@ def test_a_minimum_that_no_time_is_left_to_check_is_not_called_one(
 @pytest.mark.parametrize("scheme", ["galerkin-2", "galerkin-2x8", "taylor-midpoint"])
 @pytest.mark.parametrize("name", ["two_link_reach", "panda_reach", "cart_pole_swing_up"])
 def test_a_motion_of_half_an_hour_on_few_intervals_is_no_minimum(name: str, scheme: str) -> None:
-    """As where milliseconds were meant: between the points the arm whirls or falls."""
+    """As where milliseconds were meant: between the points the arm spins or falls."""
     task = hovi.load_task(hovi.example(name))
     options = {"scheme": scheme, "tolerance": None, "intervals": 16, **FAST}
     with pytest.warns(HoviWarning, match="the duration of 2000 s looks like milliseconds"):

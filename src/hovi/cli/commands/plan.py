@@ -220,7 +220,7 @@ def _plan(task: Task, out: Path | None, json: bool, certified: bool, verbose: bo
 
 
 def _note_assumptions(task: Task) -> None:
-    """Print what the plan assumes without being told; see its message for more."""
+    """Print what the plan assumes without being asked; see its message for more."""
     import sys
     from contextlib import suppress
 

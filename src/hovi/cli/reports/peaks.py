@@ -13,7 +13,7 @@ Array = npt.NDArray[np.float64]
 
 SAMPLES_PER_INTERVAL = 20
 MAX_SAMPLES = 20_000
-"""Number of samples in which extremes are sought, with an upper bound for the whole motion."""
+"""Number of samples at which extremes are looked for, with an upper bound for the whole motion."""
 
 
 @dataclass(frozen=True, eq=False)

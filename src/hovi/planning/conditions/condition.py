@@ -44,7 +44,7 @@ class Condition(Generic[Values, Place]):
     name: in messages. unit: of y, in messages. of: names of its entries there, such as joints.
     scale: of y, one number or one for each entry: by default the range between its bounds, or the
         size of the only one. Bounds that are functions of time need it.
-    tolerance: share of the scale by which a bound may be exceeded anywhere.
+    tolerance: fraction of the scale by which a bound may be exceeded anywhere.
     Raises InputError for anything else.
     """
 

@@ -97,7 +97,7 @@ def first_guesses(
 def _drawn(
     problem: TrajectoryProblem, direct: DiscretePath, deadline: Deadline, count: int, seed: int
 ) -> tuple[DiscretePath, ...]:
-    """So many paths, or those that are found in their share of the time that is left."""
+    """So many paths, or those that are found in their fraction of the time that is left."""
     paths = list[DiscretePath]()
     try:
         with deadline.part(PATH_SHARE).in_force():

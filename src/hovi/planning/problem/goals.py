@@ -38,7 +38,7 @@ FULL_RANK = 1e-6
 @check_arguments_except("time", "goal")
 @dataclass(frozen=True, eq=False)
 class Via:
-    """A via point: a goal that the motion meets at a given time.
+    """A via point: a goal that the motion reaches at a given time.
 
     time: in [s]; a text such as "500 ms" is converted.
     goal: a State, whose velocity is free if none is given, or its configuration alone; or a

@@ -1,4 +1,4 @@
-"""Inverse kinematics: the configurations in which a frame meets its goal."""
+"""Inverse kinematics: the configurations in which a frame reaches its goal."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def inverse_kinematics(
     most: int = MOST,
     seeds: int = SEEDS,
 ) -> Array:
-    """Distinct configurations in which a frame meets its goal, best first, shape (K, nq), K >= 1.
+    """Distinct configurations in which a frame reaches its goal, best first, shape (K, nq), K >= 1.
 
     The best is the one nearest to `near` in |q (-) near|. The goal is met to 1e-9 m and 1e-9 rad. A
     revolute joint with a range of more than a turn is given at the turn nearest to `near`;
@@ -108,7 +108,7 @@ def configurations(
     most: int = MOST,
     seeds: int = SEEDS,
 ) -> Array:
-    """As `inverse_kinematics`: the configurations in which a frame meets its goal, (K, nq).
+    """As `inverse_kinematics`: the configurations in which a frame reaches its goal, (K, nq).
 
     near: shape (nq,). bounds: as position_bounds. Raises UnreachableError.
     """

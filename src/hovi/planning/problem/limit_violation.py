@@ -32,7 +32,7 @@ BATCH = 128
 """Extremes that are refined at once."""
 REFINEMENT_SHARE = 0.05
 """The largest extreme of an output in an interval is refined if it is closer than this to a bound,
-as a share of its range."""
+as a fraction of its range."""
 COARSE_MODES = 4
 COARSE = 4, 2
 """Stride of the samples that `excess_of` looks at first: on grids of at most COARSE_MODES inner
@@ -40,7 +40,7 @@ modes, and on others."""
 PEAK_SHARE = 2e-3
 """The same for every other local extreme; smaller, as a motion along a bound has many of them."""
 AT_LIMIT = 1e-3
-"""Distance to a bound, as a share of its range, within which an output is at the bound."""
+"""Distance to a bound, as a fraction of its range, within which an output is at the bound."""
 
 
 class SampledBounds(ABC):
@@ -86,7 +86,7 @@ Bounds = Limits | SampledBounds
 
 @dataclass(frozen=True, eq=False)
 class Excess:
-    """Largest excess over each bound in each interval, as a share of its range; negative inside.
+    """Largest excess over each bound in each interval, as a fraction of its range; negative inside.
 
     lower, upper: shape (N, kinds, nv). at_lower, at_upper: relative position in the interval of
         that excess, in [0, 1].
@@ -328,7 +328,7 @@ def worst_sentence(trajectory: Trajectory, limits: Limits, coordinates: Coordina
 
 
 def closeness(trajectory: Trajectory, limits: Limits) -> Array:
-    """Smallest distance of each output from its bounds, as a share of its range, (kinds, nv).
+    """Smallest distance of each output from its bounds, as a fraction of its range, (kinds, nv).
 
     Negative where a limit is exceeded, infinite where there is none. Rows as in limits.kinds.
     """

@@ -54,10 +54,10 @@ class Limits(LimitsSummary):
     lower, upper: shape (6, nv), one row per kind, in [rad], [rad/s], [rad/s^2], [N m], [rad/s^3]
         and [N m/s] (metres and newtons for sliding joints); or only the first four rows, (4, nv).
         Limits on the jerk and on d tau / dt need a Lagrangian of order 3.
-    tolerance: share of its range by which a limit may be exceeded anywhere.
+    tolerance: fraction of its range by which a limit may be exceeded anywhere.
     parts, ends: of a motion in segments, see `of_segments`.
     strict: whether a start outside its limits, or that cannot but leave them, is refused.
-    window: least share of the motion in which it is led back otherwise.
+    window: least fraction of the motion in which it is led back otherwise.
     excused: of a motion, what its start exceeds until when; `TrajectoryProblem` sets it.
     conditions: bounds of other quantities, such as the power, which `as_limits` makes.
     Raises InputError for NaN and for a range that is empty to rounding.
@@ -258,7 +258,7 @@ class Limits(LimitsSummary):
         return self._between(lower, upper)
 
     def excess(self, outputs: Array) -> Array:
-        """Distance of each output outside its range, as a share of the range; negative inside.
+        """Distance of each output outside its range, as a fraction of the range; negative inside.
 
         outputs: in the order of `kinds`, shape (..., kinds, nv).
         """
@@ -271,9 +271,9 @@ class Limits(LimitsSummary):
         return np.asarray(outside / self.ranges)
 
     def with_margin(self, margin: float) -> Limits:
-        """Limits tightened by a share of their ranges on both sides. Raises InputError."""
+        """Limits tightened by a fraction of their ranges on both sides. Raises InputError."""
         if not (np.isfinite(margin) and 0 <= margin < 0.5):
-            raise InputError(f"a margin must be a share of the range in [0, 0.5), got {margin}.")
+            raise InputError(f"a margin must be a fraction of the range in [0, 0.5), got {margin}.")
         shift = margin * self.ranges
         if self.parts:
             return Limits.of_segments([p.with_margin(margin) for p in self.parts], self.ends)
@@ -322,8 +322,8 @@ def as_limits(
         "none", the name of an arm of `hovi.limit_sets`, a Limits, or a mapping with any of `base`
         (one of these names, "urdf" by default), `q`, `v`, `a`, `tau`, `jerk`, `torque_rate`,
         `power` (of tau v, in [W]), `margin` and `tolerance`. A kind is a number x for -x and x, a
-        text such as "50 %" for that share of the base's limits (not of positions or the power), a
-        list of these or of pairs (lower, upper), or a mapping from joint names to any of them.
+        text such as "50 %" for that fraction of the base's limits (not of positions or the power),
+        a list of these or of pairs (lower, upper), or a mapping from joint names to any of them.
     order: of the motion. What an arm's set says of jerk and torque rate applies from order 3 on.
     Raises InputError for unknown keys or joints and for bounds that do not fit the coordinates.
     Warns of ranges of angles that look like degrees.

@@ -28,11 +28,11 @@ LAST_BARRIER = 1e-8
 """Last barrier parameter within limits where nothing else is asked for, relative to the mean
 density of the cost, which exceeds its minimum by some ten times as much."""
 BARRIER_SHARE, LARGEST_BARRIER = 3e-3, 3e-6
-"""The same for a tolerance of the cost, as a share of it, and at most."""
+"""The same for a tolerance of the cost, as a fraction of it, and at most."""
 FINER_SHARES = 1 / 30, 1e-3, 1e-5
 """Fractions of a tolerance that are tried if a minimum satisfies it and is still not resolved."""
 REMAINING_SHARE = 0.5
-"""Predicted relative decrease of the last step within limits, as a share of the last barrier."""
+"""Predicted relative decrease of the last step within limits, as a fraction of the last barrier."""
 
 
 class Quantity(StrEnum):

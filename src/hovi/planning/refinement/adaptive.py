@@ -25,7 +25,7 @@ from hovi.planning.refinement.hp_refinement import galerkin_with_more_points
 from hovi.planning.refinement.interpolated_outputs import interpolated_slopes
 from hovi.planning.refinement.nearby_minimum import nearby_minimum
 from hovi.planning.refinement.next_grid import MAX_ERROR_OF_DECAY, interpolated_to, next_grid
-from hovi.planning.refinement.whirling import MAX_WORK
+from hovi.planning.refinement.spinning import MAX_WORK
 from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.central_path import CentralPath
 from hovi.planning.solver.solver import Solution, solve_on_grid
@@ -47,8 +47,8 @@ MAX_FIRST_INTERVALS = 60
 """Maximum number of intervals of the first grid."""
 RESTART_ERROR = 0.05
 """Relative error of the first cost above which the refinement begins again with more points."""
-RESTART_ERROR_WHIRLING = 0.02
-"""The same for a motion in which a joint whirls."""
+RESTART_ERROR_SPINNING = 0.02
+"""The same for a motion in which a joint spins."""
 MAX_ROUNDS = 14
 """Maximum number of grids."""
 MAX_STALLED_ROUNDS = 2
@@ -211,12 +211,12 @@ class _Search:
         if candidate.is_at_floor:
             bound = "the tolerance of limits" if solution.problem.limited else "rounding"
             return f"{bound} allows no smaller error"
-        whirling, nearly = candidate.whirl, candidate.difference <= MAX_ERROR_OF_DECAY
+        spinning, nearly = candidate.spin, candidate.difference <= MAX_ERROR_OF_DECAY
         grids = len(self.rounds)
-        if whirling is not None and whirling.is_hopeless(
+        if spinning is not None and spinning.is_hopeless(
             grids=grids, alone=alone, nearly_resolved=nearly
         ):
-            return f"joint {whirling.joint!r} whirls at {whirling.speed:.3g} rad/s"
+            return f"joint {spinning.joint!r} spins at {spinning.speed:.3g} rad/s"
         if stalled >= MAX_STALLED_ROUNDS:
             return f"the last {MAX_STALLED_ROUNDS} grids did not reduce the error"
         if len(self.rounds) >= MAX_ROUNDS:
@@ -259,7 +259,7 @@ class _Search:
         along: central path of that motion on the grid of the problem; None for none.
         """
         steps = self.max_iterations
-        if last.whirl is not None:
+        if last.spin is not None:
             steps = min(steps, MAX_WORK // problem.grid.intervals)
         taken, seconds = 0, 0.0
         # A motion would be moved out of its obstacles once more, were it not for `near`. Within
@@ -343,7 +343,7 @@ def _along(
 def _hides(candidate: Candidate) -> bool:
     """Whether a motion on few points is not near a finer one, so that its torque may hide."""
     known = candidate.error_of_cost
-    most = RESTART_ERROR if candidate.whirl is None else RESTART_ERROR_WHIRLING
+    most = RESTART_ERROR if candidate.spin is None else RESTART_ERROR_SPINNING
     return known is None or known > most
 
 

@@ -26,7 +26,7 @@ from hovi.planning.refinement.passive_torque import (
     PassiveTorque,
     passive_torque,
 )
-from hovi.planning.refinement.whirling import Whirl, whirl_without_limits
+from hovi.planning.refinement.spinning import Spin, spin_without_limits
 from hovi.planning.solver.limits.limit_rows import MAX_LOSS
 from hovi.planning.solver.outcome.cost_with_time import price_of_time
 from hovi.planning.solver.solver import Solution
@@ -37,7 +37,7 @@ from hovi.system.dataclass import dataclass
 Array = npt.NDArray[np.float64]
 
 ACCEPTED_SHARE = 0.8
-"""Largest accepted estimate, as a share of the tolerance."""
+"""Largest accepted estimate, as a fraction of the tolerance."""
 CANCELLATION_LIMIT = 20.0
 """Largest accepted sum of the intervals' |contributions| to the cost's error, in tolerances."""
 HAMILTONIAN_ERROR_SHARE = 0.1
@@ -146,9 +146,9 @@ class Candidate:
         return np.inf if known is None else max(known, self.along)
 
     @cached_property
-    def whirl(self) -> Whirl | None:
-        """The joint that whirls; None if none does, and for limited problems."""
-        return None if self.solution.problem is None else whirl_without_limits(self.solution)
+    def spin(self) -> Spin | None:
+        """The joint that spins; None if none does, and for limited problems."""
+        return None if self.solution.problem is None else spin_without_limits(self.solution)
 
     @property
     def larger_error(self) -> float:
@@ -218,7 +218,7 @@ class Candidate:
 def _cost_of_unfinished(solution: Solution) -> float:
     """The cost of an unfinished solve without limits: of the action, or along its curve if larger.
 
-    inf if it may not meet limits or equations, or ended for another reason.
+    inf if it may violate limits or equations, or ended for another reason.
     """
     problem, status = solution.problem, solution.status
     if problem is None or status not in (Status.ITERATION_LIMIT, Status.TIME_LIMIT):

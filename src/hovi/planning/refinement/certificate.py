@@ -55,7 +55,7 @@ class Certificate:
         that of time. integral: of L~ along the interpolant, by a quadrature that the scheme does
         not use. integral_error: of the quadrature.
     bound: upper bound of the cost of this local minimum, the integral plus its error: for a curve
-        that meets all constraints, since no such curve nearby costs less than the minimum.
+        that satisfies all constraints, since no such curve nearby costs less than the minimum.
     errors: estimates of the distance from the motion that the plan approximates.
     hamiltonian: Pontryagin's, at the nodes.
     residual: largest jump of the momenta at an inner node, relative to the largest momentum.
@@ -147,7 +147,7 @@ def certify(
 
 
 def _upper_bound(solution: Solution, problem: TrajectoryProblem, integral: CurveIntegral) -> float:
-    """integral + error. Raises InputError where the curve does not meet what was asked."""
+    """integral + error. Raises InputError where the curve does not satisfy what was asked."""
     if solution.status is not Status.MINIMUM:
         raise InputError(f"the motion is no minimum but ended in {solution.status}")
     if problem.constrained:

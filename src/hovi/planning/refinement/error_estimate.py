@@ -49,7 +49,7 @@ the coarser one, with which that difference is still used."""
 RICHER_LEVEL = 3e-4
 """Barrier parameter at which a solve with more modes begins within limits."""
 RICHER_BARRIER = 1e-7
-"""Its least last barrier parameter, whose share of the cost is less than errors that can be told.
+"""Its least last barrier parameter, which adds less to the cost than errors that can be resolved.
 """
 SAME_LEVEL = 1.1
 """Ratio of its last barrier parameter to the wanted one up to which it needs no further steps."""
@@ -118,7 +118,7 @@ class FinerSolution:
     """A solution of a problem on a finer grid.
 
     problem: on the finer grid; limits may have split its intervals.
-    path: its solution, up to a small share of its distance from the coarser one. cost: its
+    path: its solution, up to a small fraction of its distance from the coarser one. cost: its
         discrete action and the price of time. known: the cost of the coarser solution.
     gains: L_d of each interval of the coarser solution minus L_d with the modes of the finer grid
         and the same end data, shape (N,): the interval's contribution to the error of the cost.
@@ -219,7 +219,7 @@ def followed_within_limits(
 def _finished(found: FinerSolution, barrier: float) -> Solution | None:
     """A motion that is no minimum yet, or whose limits were not checked, solved to the end.
 
-    It is returned as it is if it was solved to the end and meets its limits between the points too.
+    It is returned as it is if it was solved to the end and satisfies its limits between the points.
     barrier: last barrier parameter, relative to the mean density of the cost.
     """
     known = found.finish()

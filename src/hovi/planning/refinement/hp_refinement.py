@@ -100,12 +100,12 @@ def refined(
     decay_known: bool = True,
     few_points: bool = True,
 ) -> Grid:
-    """The cheapest grid that is predicted to meet every demand, with one scheme or two.
+    """The cheapest grid that is predicted to satisfy every demand, with one scheme or two.
 
     rho: decay of each interval, shape (N,). joints: degrees of freedom of the robot.
     decay_known: whether that is the decay of the motion; else modes are at most UNRESOLVED_MODES.
     few_points: whether an interval has r + k quadrature points, else MORE_POINTS more.
-    An interval whose demands no choice meets is split into four.
+    An interval whose demands no choice satisfies is split into four.
     """
     current = np.array([scheme.inner_modes for scheme in grid.schemes])
     allowed = MODES if decay_known else MODES[MODES <= UNRESOLVED_MODES]

@@ -10,7 +10,7 @@ from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.solver import Solution
 
 MIN_DISTANCE = 0.01
-"""Smallest distance of such a motion from every bound, as a share of the range."""
+"""Smallest distance of such a motion from every bound, as a fraction of the range."""
 
 
 def far_from_limits(solution: Solution) -> bool:

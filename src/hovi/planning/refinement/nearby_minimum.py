@@ -40,7 +40,7 @@ MAX_REUSE_DISTANCE = 1e-2
 
 @dataclass(frozen=True, eq=False)
 class NearbyMinimum:
-    """The end of an approach to a minimum, up to a small share of the distance covered.
+    """The end of an approach to a minimum, up to a small fraction of the distance covered.
 
     objective: the discrete action. path: the last iterate. value: the action at the minimum, to
         first order in the remaining distance.

@@ -17,7 +17,7 @@ NEGLIGIBLE_SHARE = 0.01
 """Largest torque of a passive joint along a motion, relative to that of the other joints."""
 
 LEAST_TORQUE = 1e-9
-"""Smallest torque that others are relative to, as a share of the inertial torque M / T^2: at rest
+"""Smallest torque that others are relative to, as a fraction of the inertia torque M / T^2: at rest
 all torques are rounding errors."""
 
 

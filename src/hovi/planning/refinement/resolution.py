@@ -40,11 +40,11 @@ from hovi.planning.refinement.faults.on_curve import (
 )
 from hovi.planning.refinement.faults.remedy import remedy
 from hovi.planning.refinement.limit_sensitivity import limit_prices
-from hovi.planning.refinement.whirling import (
+from hovi.planning.refinement.spinning import (
     fault_of_distance,
-    fault_of_whirling,
-    whirl,
-    whirl_without_minimum,
+    fault_of_spinning,
+    spin,
+    spin_without_minimum,
 )
 from hovi.planning.solver.methods.method import Method, Report
 from hovi.planning.solver.methods.stationary import Stationary
@@ -65,10 +65,10 @@ NEARBY = 0.05
 compared with a finer one again."""
 FARTHER, GROWTH = 0.5, 2.0
 """The same without obstacles, equations and segments while the same limits are active or, without
-any, no joint whirls; and the factor on an estimate that is kept beyond NEARBY."""
+any, no joint spins; and the factor on an estimate that is kept beyond NEARBY."""
 PRICE_CHANGE, LEAST_PRICE = 0.25, 0.02
 """Relative change of the price of a limit up to which it is the same one, and the least price, as a
-share of the cost, that this is relative to: see limit_prices."""
+fraction of the cost, that this is relative to: see limit_prices."""
 ERROR_PER_PRICE = 0.01
 """Error of the cost, per change of the price of a limit, that is added to an estimate that is kept:
 a limit that begins to hold adds less."""
@@ -139,9 +139,9 @@ def resolved(solution: Solution) -> Solution:
         most 1 %. The finer grid has two more modes per interval, of a Galerkin table for any
         scheme; under limits every interval is halved where that fails;
     (c) that solution was found;
-    (d) no light joint without limits whirls too fast for the error of the cost; if one whirls
+    (d) no light joint without limits spins too fast for the error of the cost; if one spins
         fast, the finer solution has a minimum nearby on a still finer grid: see
-        `fault_of_whirling`;
+        `fault_of_spinning`;
     (e) without limits, the finer solution is near, or a still finer one is much closer to it: see
         `fault_of_distance`;
     (f) no effect has features between the points that change the cost by more: see `features_of`;
@@ -178,22 +178,22 @@ def _checked(solution: Solution) -> tuple[Solution, str, FinerSolution | None]:
     elif not reason and not costs_nothing(solution):
         reason = _fault_of_estimate(solution.error_estimate)
     error = None if costs_nothing(solution) else solution.error_estimate
-    for fault_of in (fault_of_whirling, fault_of_distance):
+    for fault_of in (fault_of_spinning, fault_of_distance):
         reason = reason or fault_of(solution, error, finer)
     if not reason:
         solution, reason = with_features(solution)
     return solution, reason, finer
 
 
-def unresolved_if_whirling(solution: Solution) -> Solution:
-    """A motion at its iteration limit, with the status UNRESOLVED if a light joint whirls in it."""
-    whirling = whirl_without_minimum(solution)
-    if whirling is None:
+def unresolved_if_spinning(solution: Solution) -> Solution:
+    """A motion at its iteration limit, with the status UNRESOLVED if a light joint spins in it."""
+    spinning = spin_without_minimum(solution)
+    if spinning is None:
         return solution
     return dataclasses.replace(
         solution,
         status=Status.UNRESOLVED,
-        message=f"{solution.message.rstrip('.')}: {whirling}.",
+        message=f"{solution.message.rstrip('.')}: {spinning}.",
         trajectory=with_metadata(solution.trajectory, status=str(Status.UNRESOLVED)),
     )
 
@@ -239,7 +239,7 @@ class Resolution(MotionCheck):
         motion = self.motion
         if motion is None or motion.problem is None or not _limits_alone(motion.problem):
             return NEARBY
-        calm = self.prices is not None if motion.problem.limited else whirl(motion) is None
+        calm = self.prices is not None if motion.problem.limited else spin(motion) is None
         return FARTHER if calm else NEARBY
 
     def __call__(self, solution: Solution) -> Solution:

@@ -242,7 +242,7 @@ class _Choice:
         return [State(q, free_velocity=velocity) for q in self._branches(self.start, near)]
 
     def _branches(self, goal: FrameGoal, near: Array | None) -> Array:
-        """Configurations in which a frame meets its goal: that at the guess alone if it has one."""
+        """Configurations in which a frame reaches its goal: that at its guess if it has one."""
         robot, options = self.scene.robot, self.options
         first = first_configuration(robot, goal, near if goal.guess is None else None, self._bounds)
         most = SKETCHED if _is_one(self.start) or _is_one(self.goal) else MOST

@@ -34,7 +34,7 @@ SolveFor = Callable[[float, Trajectory], Solution]
 PROBES = 4, 2
 """Numbers of other first durations, on the more and on the less promising side."""
 MAX_STRIDE = 1.3
-"""Maximum ratio of successive durations while a bracket is sought."""
+"""Maximum ratio of successive durations while a bracket is searched for."""
 DURATION_PRECISION = 1e-12
 """Relative tolerance of the duration."""
 SLOPE_PRECISION = 1e-10
@@ -184,7 +184,7 @@ class _Trial:
         return self.slope * (other.duration - self.duration) < 0
 
     def steeper_than(self, share: float) -> bool:
-        """Whether |J' + w| exceeds a share of (J + w T) / T."""
+        """Whether |J' + w| exceeds a fraction of (J + w T) / T."""
         return abs(self.slope) > share * abs(self.total) / self.duration
 
     def gap_to(self, other: _Trial) -> float:

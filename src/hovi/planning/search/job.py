@@ -45,7 +45,7 @@ MAX_CHART_INTERVALS = 2000
 class JobSegment:
     """A segment of a job.
 
-    end: when it ends, as a share of the duration, 1 for the last. acting: what acts in it.
+    end: when it ends, as a fraction of the duration, 1 for the last. acting: what acts in it.
     """
 
     end: float
@@ -54,7 +54,7 @@ class JobSegment:
 
 @dataclass(frozen=True)
 class Acting:
-    """Effects beside those of a scene; one of the same kind takes the place of the scene's own.
+    """Effects besides those of a scene; one of the same kind takes the place of the scene's own.
 
     effects: which are equal to others where they can be compared, and are.
     """

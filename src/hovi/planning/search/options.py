@@ -88,7 +88,7 @@ class PlanOptions:
         least=0,
     )
     via: Sequence[Via] = option(
-        (), "goals that the motion meets at given times: Via, or tables as in a scene file."
+        (), "goals that the motion reaches at given times: Via, or tables as in a scene file."
     )
     conditions: Sequence[Condition[Any, Any]] = option(
         (),

@@ -16,8 +16,8 @@ from hovi.planning.problem.presolve.ramps import graded_to_ramps
 from hovi.planning.refinement.error_estimate import with_metadata
 from hovi.planning.refinement.faults.narrow_features import NARROW
 from hovi.planning.refinement.hp_refinement import galerkin_with_more_points
-from hovi.planning.refinement.resolution import Resolution, resolved, unresolved_if_whirling
-from hovi.planning.refinement.whirling import whirl_without_minimum
+from hovi.planning.refinement.resolution import Resolution, resolved, unresolved_if_spinning
+from hovi.planning.refinement.spinning import spin_without_minimum
 from hovi.planning.search.branch_choice import Ends
 from hovi.planning.search.continuation import STOPPED, UNUSABLE, may_help, solve_by_continuation
 from hovi.planning.search.final_stages import (
@@ -221,7 +221,7 @@ class Search:
             if self.deadline.passed or interrupted():
                 break
         best = self._seeing_features(found[0], checked[0])
-        return [best if self.fine.tolerance is None else unresolved_if_whirling(best)]
+        return [best if self.fine.tolerance is None else unresolved_if_spinning(best)]
 
     def _at_finer_tolerances(self, solution: Solution, refused: Solution) -> Solution:
         """A minimum that is unresolved at its tolerance, refined to finer ones until it is not.
@@ -284,7 +284,7 @@ class Search:
         return job if job.grid.intervals < grid.intervals else self.fine
 
     def _explored(self, job: Job) -> Exploration:
-        """The minima from all starts; uses a share of the time if they are refined afterwards."""
+        """The minima from all starts; uses part of the time if they are refined afterwards."""
         options = job.options
         whole = job is self.fine and job.tolerance is None and self.free is None
         deadline = self.deadline.part(SOLVING_SHARE if whole else EXPLORATION_SHARE)
@@ -316,7 +316,7 @@ class Search:
             return found
         if self.fine.tolerance is not None:
             known = dataclasses.replace(found[0], problem=on_grid_of(job.problem(), found[0]))
-            if whirl_without_minimum(known) is not None:  # no easier problem leads to an answer
+            if spin_without_minimum(known) is not None:  # no easier problem leads to an answer
                 return found
         return [solve_by_continuation(job, found[0], options.guess, self.deadline, self.progress)]
 

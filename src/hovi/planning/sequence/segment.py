@@ -42,7 +42,7 @@ class Segment:
         velocities or leaves them free (`free_velocity`), and it does not stop where there is none
         (None).
     duration: T in [s], or a text such as "1.5 s".
-    effects: what acts in this segment beside the effects of the scene, such as the payload that is
+    effects: what acts in this segment besides the effects of the scene, such as the payload that is
         carried, also as tables by name; one of a kind that the scene has takes its place.
     limits: of this segment, as for `hovi.plan`; those of the options if None.
     name: in messages and reports.

@@ -24,7 +24,7 @@ def segment_findings(
     moves: of the sequence; limits are not looked at in those over several segments, nor after a
     goal that cannot be reached, which the problem itself names. limits, names: of the segments.
     """
-    told, looked_like, before = list[str](), list[str](), _as_start(job.start)
+    reported, looked_like, before = list[str](), list[str](), _as_start(job.start)
     for move in moves:
         number = move.numbers[0]
         if before is None:
@@ -34,12 +34,12 @@ def segment_findings(
         looked_like += slips(problem)
         if len(move.numbers) == 1:
             found = about_limits(problem, before, move.goal)
-            told += [f"in {names[number]!r} {sentence}" for sentence in found.warnings]
+            reported += [f"in {names[number]!r} {sentence}" for sentence in found.warnings]
             if found.reason:
                 reason = f"in {names[number]!r} {found.reason}"
-                return Findings(reason, (*dict.fromkeys(looked_like), *told))
+                return Findings(reason, (*dict.fromkeys(looked_like), *reported))
         before = _as_start(move.goal)
-    return Findings("", (*dict.fromkeys(looked_like), *told))
+    return Findings("", (*dict.fromkeys(looked_like), *reported))
 
 
 def _alone(job: Job, move: MoveToGoal, start: State, limits: Limits) -> TrajectoryProblem:

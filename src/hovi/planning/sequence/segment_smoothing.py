@@ -1,8 +1,8 @@
 """smooth = True of a sequence: each segment has the cost on the jerk that it would have alone.
 
 A segment in which the robot stands still, such as one in which a gripper closes, has that of the
-longer of the motions beside it. By its own duration, its accelerations could come and go as fast as
-the gripper closes; the motions beside it are not that fast, and nothing is gained by it.
+longer of the neighboring motions. By its own duration, its accelerations could come and go as fast
+as the gripper closes; the neighboring motions are not that fast, and nothing is gained by it.
 """
 
 from __future__ import annotations

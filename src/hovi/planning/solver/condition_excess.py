@@ -48,7 +48,7 @@ class ConditionBounds(SampledBounds):
         return np.stack(np.split(over - (self.tolerance - least), 2, axis=1))
 
     def margin(self, trajectory: Trajectory) -> float:
-        """The least distance from any bound, as a share of the scale; negative beyond it."""
+        """The least distance from any bound, as a fraction of the scale; negative beyond it."""
         return -float(excess_along(trajectory, self).upper.max())
 
     def worst(self, trajectory: Trajectory) -> tuple[float, str]:

@@ -238,9 +238,9 @@ class LimitsTable(Table):
     torque_rate: Bounds | None = Field(default=None, description=_BOUNDS)
     power: PositionBounds | None = Field(default=None, description=_POSITION_BOUNDS)
     margin: FiniteFloat = Field(
-        default=0.0, ge=0, lt=0.5, description="a share of the range, from 0 to below 0.5"
+        default=0.0, ge=0, lt=0.5, description="a fraction of the range, from 0 to below 0.5"
     )
-    tolerance: FiniteFloat = Field(default=1e-6, gt=0, description="a positive share of the range")
+    tolerance: FiniteFloat = Field(default=1e-6, gt=0, description="fraction of the range, above 0")
 
 
 class GraspedTable(Table):

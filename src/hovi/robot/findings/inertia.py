@@ -145,7 +145,7 @@ def light_joints(subject: Subject) -> Iterator[Finding]:
             "light-joint",
             tuple(light),
             f"little inertia about {shown}: without limits or the effects armature and "
-            "acceleration_cost a least-torque motion may whirl there",
+            "acceleration_cost a least-torque motion may spin there",
             (Line(PYTHON, f"hovi.effects.Armature({rotors})"),),
         )
 

@@ -51,7 +51,7 @@ class ConfigurationsTable(Table):
 
     count: Count = Field(description=_COUNT)
     share: FiniteFloat = Field(
-        default=1.0, gt=0, le=1, description="a share of the joints' ranges, above 0 up to 1"
+        default=1.0, gt=0, le=1, description="a fraction of the joints' ranges, above 0 up to 1"
     )
     sampler: SamplerName = Field(
         default="uniform", description='"uniform", "sobol" or "latin-hypercube"'
@@ -112,7 +112,7 @@ class VaryTable(Table):
 
 @dataclass(frozen=True, eq=False)
 class AxisContext:
-    """What an axis may depend on beside its table.
+    """What an axis may depend on besides its table.
 
     folder: to which paths are relative. robot: of the template, loaded when it is asked for.
     seed: for an axis that has none of its own.

@@ -20,7 +20,7 @@ from hovi.version import __version__
 Array = npt.NDArray[np.float64]
 
 SAMPLES_PER_INTERVAL, MAX_SAMPLES = 20, 20_000
-"""Samples in which peaks are sought, of an interval and of a motion."""
+"""Samples at which peaks are looked for, of an interval and of a motion."""
 UNTOUCHED_SHARE = 0.05
 """Share of a time limit below which the limit has changed nothing: all parts of a plan get more."""
 

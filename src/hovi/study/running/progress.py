@@ -21,7 +21,7 @@ class StudyProgress:
     """The state of a run.
 
     count: of all cells. before: how many were done when it began. done: how many are done now.
-    failures: of this run, by status. failed: the receipt of the failure that has just been told.
+    failures: of this run, by status. failed: the receipt of the failure that was reported last.
     """
 
     count: int
@@ -56,7 +56,7 @@ class StudyProgress:
 
     @property
     def fraction(self) -> float:
-        """The share of the cells that is done, in [0, 1]."""
+        """The fraction of the cells that is done, in [0, 1]."""
         return self.done / max(self.count, 1)
 
     def text(self) -> str:

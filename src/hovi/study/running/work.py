@@ -80,7 +80,7 @@ class CellJob:
 
 @dataclass(frozen=True)
 class Receipt:
-    """What the parent is told of a plan that is done and stored.
+    """What the parent gets to know of a plan that is done and stored.
 
     reason: of a failure; "" for a success. motion: where it is, which its children start from.
     """
@@ -235,7 +235,7 @@ def _guesses(task: Task, job: CellJob, desk: _Desk) -> list[tuple[str, Trajector
 
 
 def _met(task: Task, target: FrameGoal, other: State | FrameGoal) -> State:
-    """At rest where a frame meets its target, as near to the other end as was found."""
+    """At rest where a frame reaches its target, as near to the other end as was found."""
     robot = task.held_scene.robot
     options = task.options.decided(robot)
     near = None

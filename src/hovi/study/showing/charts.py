@@ -28,7 +28,7 @@ _LABELS = {
     "cost": "cost",
     "effort": "effort",
     "nit": "steps of the optimiser",
-    "margin": "smallest margin to a limit, share of its range",
+    "margin": "smallest margin to a limit, fraction of its range",
     "least_distance": "least distance [m]",
     "seconds": "wall time of a plan [s]",
     "motion_duration": "duration [s]",

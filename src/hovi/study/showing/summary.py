@@ -10,7 +10,7 @@ from hovi.study.showing.plans import Plans
 
 QUANTILES = (0.0, 0.25, 0.5, 0.75, 1.0)
 SHOWN = ("cost", "error_estimate", "nit", "margin", "least_distance", "seconds")
-"""The columns of which quantiles are told."""
+"""The columns of which quantiles are reported."""
 
 
 def summary(plans: Plans) -> dict[str, Any]:

@@ -23,7 +23,7 @@ class PlanRow:
     cost, effort, error_estimate, nit, n_neg: of the Solution.
     duration: of the motion, in [s]. intervals: of its grid.
     peak_v, peak_a, peak_tau: largest |v|, |a| and |tau| of each joint.
-    margin: the smallest distance to a limit, as a share of its range; negative beyond one, None
+    margin: the smallest distance to a limit, as a fraction of its range; negative beyond one, None
         without limits. least_distance: to obstacles and between links, in [m], None without.
     q_start, q_goal: first and last configuration.
     reproducible: False if the time that a plan takes on this machine may have changed it.

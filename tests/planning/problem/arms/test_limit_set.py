@@ -231,7 +231,7 @@ def reached(robot: Robot, trajectory: hovi.Trajectory, armature: float) -> dict[
 
 
 def least_room(values: dict[str, Array], arm: LimitSet, kinds: Iterable[str]) -> dict[str, float]:
-    """The least distance to a limit of each kind, as a share of its range."""
+    """The least distance to a limit of each kind, as a fraction of its range."""
     room = {}
     for kind in kinds:
         low, high = np.array(arm.limits[kind]).T

@@ -418,7 +418,7 @@ ASSUMED: dict[str, tuple[dict[str, Any], tuple[str, ...]]] = {
         },
         ("a force and a moment", "name it in `passive`"),
     ),
-    "newtons beside newton metres": (
+    "newtons next to newton metres": (
         ARM | {"robot": CART, "limits": "none", "goal": {"q": [0.2, 0.1]}},
         ("squares of forces in N", "torques in N m", "effort_weight"),
     ),

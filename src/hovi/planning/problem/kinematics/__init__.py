@@ -1,1 +1,1 @@
-"""Orientations of frames, and the configurations in which a frame meets a goal."""
+"""Orientations of frames, and the configurations in which a frame reaches a goal."""

@@ -1,4 +1,4 @@
-"""Several configurations in which a frame meets its goal, by the compiled search where it can.
+"""Several configurations in which a frame reaches its goal, by the compiled search where it can.
 
 The compiled search runs Levenberg and Marquardt's method within the limits, first from the given
 configuration, then from those of a table whose poses are the nearest to the goal, then from random
@@ -28,7 +28,7 @@ PATIENCE = 60
 PYTHON_PATIENCE = 8
 """The same where the search runs in Python."""
 GOAL_TOLERANCE = 1e-9
-"""Largest distance [m] and angle [rad] of a configuration that meets a goal."""
+"""Largest distance [m] and angle [rad] of a configuration that reaches a goal."""
 PYTHON_TOLERANCE = 1e-6
 """The same where the search runs in Python, which may not come closer where J is singular."""
 ISOLATED = 1e-3
@@ -45,7 +45,7 @@ BEYOND_REACH = 64
 class Branches:
     """What a search found.
 
-    q: distinct configurations that meet the goal, in the order in which they were found, (K, nq).
+    q: distinct configurations that reach the goal, in the order in which they were found, (K, nq).
     best: the configuration that comes nearest to the goal, (nq,).
     """
 
@@ -62,7 +62,7 @@ class _CompiledChain:
 def find_branches(
     robot: Robot, goal: FrameGoal, near: Array, bounds: tuple[Array, Array], most: int, seeds: int
 ) -> Branches:
-    """Up to `most` configurations that meet a goal, from at most `seeds` seeds.
+    """Up to `most` configurations that reach a goal, from at most `seeds` seeds.
 
     near: the first seed, shape (nq,); joints that do not move the frame keep its values.
     bounds: lower and upper position limits, shape (nv,).

@@ -36,7 +36,7 @@ def entries(
 ) -> dict[int, tuple[float, float]]:
     """Bounds by index in v, from any of the accepted forms.
 
-    base: what texts such as "50 %" are shares of; positions need none, as they take no shares.
+    base: what texts such as "50 %" are fractions of; positions need none, as they take no shares.
     """
     found = _pairs(coordinates, kind, given, base)
     if kind == "q" and not coordinates.vector_joints:
@@ -75,7 +75,7 @@ def _pairs(
 def _bounds(
     coordinates: Coordinates, kind: str, i: int, value: Any, base: Base | None
 ) -> tuple[float, float]:
-    """The bounds of a coordinate: a pair, a number, or a share of those of the base."""
+    """The bounds of a coordinate: a pair, a number, or a fraction of those of the base."""
     name = coordinates.coordinate_names[i]
     if not isinstance(value, str):
         return _pair(kind, name, value)

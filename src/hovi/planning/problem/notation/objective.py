@@ -31,7 +31,7 @@ def with_objective(scene: Scene, objective: str, weighted: bool = False) -> Scen
         has that effect, with weights of its own.
     time: those of effort, or of acceleration for a robot without inertia.
     weighted: whether torques have weights that the scene does not know.
-    Raises InputError for weights of torques that cost nothing.
+    Raises InputError for weights of torques that are all zero.
     """
     if objective == "time":
         objective = "acceleration" if without_inertia(scene) else "effort"

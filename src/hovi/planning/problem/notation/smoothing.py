@@ -3,7 +3,7 @@
 A weight w rounds off what the motion of least effort does within sqrt(w) / M, with M the inertia of
 the joint. Here sqrt(w) / M is SMOOTHING_SHARE of the duration for the largest inertia, and longer
 for all others: lighter joints get the same weight rather than one by their own inertia, since their
-torques cost so little that they would whirl at no cost.
+torques cost so little that they would spin for free.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
 
 SMOOTHING_SHARE = 0.01
-"""Smoothing time of the largest inertia, as a share of the duration."""
+"""Smoothing time of the largest inertia, as a fraction of the duration."""
 
 
 def smoothed(scene: Scene, start: State, goal: State | FrameGoal, duration: float) -> Scene:

@@ -1,1 +1,1 @@
-"""What is told before a solve: durations that are too short, torques at ends, likely slips."""
+"""What is reported before a solve: durations that are too short, torques at ends, likely slips."""

@@ -1,4 +1,4 @@
-"""What a plan assumes without being told: no gravity, driven bases, forces beside torques."""
+"""What a plan assumes without being asked: no gravity, driven bases, forces next to torques."""
 
 from __future__ import annotations
 

@@ -38,7 +38,7 @@ def reach_of(robot: Robot) -> float:
 
 
 def hint_on_frame(robot: Robot, goal: FrameGoal) -> str:
-    """The likely reason why no configuration meets a goal, as a clause; "" for none."""
+    """The likely reason why no configuration reaches a goal, as a clause; "" for none."""
     if goal.position is not None:
         position = np.asarray(goal.position)
         unit, metres = _likely_unit(float(np.linalg.norm(position)), reach_of(robot))

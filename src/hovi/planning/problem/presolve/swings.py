@@ -19,7 +19,7 @@ from hovi.planning.problem.problem import TrajectoryProblem
 Array = npt.NDArray[np.float64]
 
 MOST_SWINGS = 130.0
-"""Number of swings above which no motion is sought; a pendulum with as many is resolved."""
+"""Number of swings above which no solve is started; a pendulum with as many is resolved."""
 DECAY = 7.0
 """A swing has decayed once |Re lambda| t is as large."""
 LONG = 50.0

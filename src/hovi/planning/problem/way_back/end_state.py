@@ -3,7 +3,7 @@
 How far a coordinate is over a bound is x(t), and the state gives x, x', ... up to an order. Their
 excess is led back by the polynomial x + x' t + ... + c t^n with c such that it vanishes at a time:
 the braking parabola where a position and its velocity are given. The time is long enough for a
-share of the acceleration and the jerk that are available.
+fraction of the acceleration and the jerk that are available.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ class EndState:
     """The state at an end of a motion, or on its way.
 
     limits: there. jet: q, v, ... in coordinates, (k, nv). held: which of them are prescribed.
-    duration: of the motion beside it, in [s]. window: the least time in which it is led back.
+    duration: of the neighboring motion, in [s]. window: the least time in which it is led back.
     torque: where the state prescribes it, (nv,); else None. accelerations: see `available`.
     """
 
@@ -164,7 +164,7 @@ class EndState:
         return None
 
     def _profile(self, over: Over, share: float, direction: int) -> BrakingProfile:
-        """How it goes on with a share of the acceleration and the jerk that lead it inside."""
+        """How it goes on with a fraction of the acceleration and the jerk that lead it inside."""
         inwards = -over.side * (direction if over.kind % 2 else 1)
         acceleration = share * float(self._available[int(inwards > 0), over.coordinate])
         torque = over.kind == KINDS.index("tau")

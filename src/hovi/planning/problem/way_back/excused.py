@@ -27,7 +27,7 @@ class Excused:
     """A limit that a start exceeds, or cannot but exceed, and how it is led back inside.
 
     Until a time the bound of the coordinate is wider by e(t) = sum_j powers_j t^j >= 0, which is
-    fixed before the motion is sought; e vanishes at that time, and from there on the limit holds.
+    fixed before the solve; e vanishes at that time, and from there on the limit holds.
 
     limit: its kind, such as "v". joint: name of the coordinate. excess: the largest e, in the unit
         of the limit. until: in [s] from the start of the motion.

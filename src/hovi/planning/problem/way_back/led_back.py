@@ -11,7 +11,7 @@ from hovi.robot.space.angle_ranges import beyond_in_degrees
 AVAILABLE_SHARE = 0.5
 """Share of the accelerations available at the start that leading it back may ask for."""
 MOST_EXCESS = 0.02
-"""Largest excess that is led back, as a share of the range of positions or of another bound."""
+"""Largest excess that is led back, as a fraction of the range of positions or of another bound."""
 
 
 def led_back(start: EndState, strict: bool) -> tuple[tuple[Excused, ...], str]:

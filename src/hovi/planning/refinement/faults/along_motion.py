@@ -243,7 +243,7 @@ class _Look:
         return np.asarray(products @ R)
 
     def _of_base(self, term: TimePart, peaks: Array, cells: Cells, steps: Array) -> Array:
-        """The share of the cost that a cell of the base's motion may hide: that in its square."""
+        """The fraction of the cost that a cell of the base's motion may hide, of its square."""
         begin = self.motion.t[cells.interval] + cells.begin * self.motion.grid.steps[cells.interval]
         away, size = term.deviation(begin, begin + steps, peaks)
         whole = self.squares.setdefault(id(term), float(np.sum(size**2 * steps)))

@@ -28,7 +28,7 @@ from hovi.planning.refinement.faults.on_curve import (
     has_own_curve,
     least_cost,
 )
-from hovi.planning.refinement.whirling import whirl_without_limits
+from hovi.planning.refinement.spinning import spin_without_limits
 from hovi.planning.solver.solver import Solution
 from hovi.system.deadline import OutOfTimeError
 
@@ -95,7 +95,7 @@ def _of_grid(solution: Solution, problem: TrajectoryProblem) -> Iterator[Caution
 
 def _of_speed(solution: Solution) -> Iterator[Caution]:
     """The light joint that spins without a limit, if one does."""
-    spinning = whirl_without_limits(solution)
+    spinning = spin_without_limits(solution)
     if spinning is not None:
         yield Caution(
             SPINS,

@@ -8,7 +8,7 @@ from typing import Any
 from hovi.discrete.trajectory import Trajectory
 
 MET = 1e-6
-"""Excess over a limit as a share of its range, and distance in [rad] or [m], up to which a motion
+"""Excess over a limit relative to its range, and distance in [rad] or [m], up to which a motion
 satisfies a requirement."""
 
 

@@ -1,4 +1,4 @@
-"""Whirling joints: without limits and rotors a light joint spins, faster on every finer grid.
+"""Spinning joints: without limits and rotors a light joint spins, faster on every finer grid.
 
 Spinning a link of inertia I up costs a torque of the order of I, while its reaction on the other
 joints grows with the square of its velocity. For small I the least torque is found at velocities
@@ -21,27 +21,27 @@ from hovi.system.dataclass import dataclass
 
 SAMPLES = 33
 """Samples per interval of the velocity, both ends included."""
-WHIRLING_RATIO = 10.0
-"""Ratio of a joint's largest velocity and (half a turn + its distance) / T above which it whirls:
+SPINNING_RATIO = 10.0
+"""Ratio of a joint's largest velocity and (half a turn + its distance) / T above which it spins:
 2 for a smooth motion from rest to rest."""
 MAX_GRIDS = 6
-"""Maximum number of grids that are tried for a whirling motion."""
+"""Maximum number of grids that are tried for a spinning motion."""
 MAX_GRIDS_ALONE = 3
 """The same for grids in a row with no solution near theirs on a finer grid."""
 MAX_INERTIA_SHARE = 0.03
-"""Largest inertia of a joint that counts as whirling, relative to that of the heaviest: the torque
+"""Largest inertia of a joint that counts as spinning, relative to that of the heaviest: the torque
 that spins a heavier one shows in the cost. `hovi info` warns of far lighter ones only."""
 MAX_WORK = 20_000
-"""Maximum number of steps times intervals of a solve that follows a whirling motion."""
+"""Maximum number of steps times intervals of a solve that follows a spinning motion."""
 HOPELESS_RATIO = 40.0
 """The same ratio above which finer grids are not tried for a motion that is not resolved."""
 DOUBTFUL_RATIO = 20.0
-"""The same ratio above which a grid is trusted only with an error below MAX_WHIRLING_ERROR, and if
+"""The same ratio above which a grid is trusted only with an error below MAX_SPINNING_ERROR, and if
 the finer solution is near a minimum on a still finer grid, too."""
 UNUSABLE_RATIO = 60.0
 """The same ratio above which no grid is trusted: a minimum on one grid is none on a finer one."""
-MAX_WHIRLING_ERROR = 1e-3
-"""Largest relative error of the cost where a joint whirls fast: with more, grids finer than the one
+MAX_SPINNING_ERROR = 1e-3
+"""Largest relative error of the cost where a joint spins fast: with more, grids finer than the one
 that it was compared with tend to find another motion."""
 MAX_HOPELESS_ERROR = 3e-4
 """The same beyond HOPELESS_RATIO."""
@@ -54,10 +54,10 @@ finer one, up to which the grids converge."""
 
 
 @dataclass(frozen=True)
-class Whirl:
-    """The joint that whirls most.
+class Spin:
+    """The joint that spins most.
 
-    speed: its largest, in [rad/s]. ratio: see WHIRLING_RATIO. inertia: about its axis with all
+    speed: its largest, in [rad/s]. ratio: see SPINNING_RATIO. inertia: about its axis with all
     other joints held, the least along the motion, in [kg m^2].
     """
 
@@ -90,19 +90,19 @@ class Whirl:
     @property
     def largest_error(self) -> float:
         """Largest relative error of the cost with which a doubtful motion is trusted."""
-        return MAX_WHIRLING_ERROR if self.ratio <= HOPELESS_RATIO else MAX_HOPELESS_ERROR
+        return MAX_SPINNING_ERROR if self.ratio <= HOPELESS_RATIO else MAX_HOPELESS_ERROR
 
     def __str__(self) -> str:
         """What it does, and what helps."""
         return (
-            f"joint {self.joint!r} whirls at up to {self.speed:.3g} rad/s with an inertia of "
+            f"joint {self.joint!r} spins at up to {self.speed:.3g} rad/s with an inertia of "
             f"{self.inertia:.2g} kg m^2, and without limits faster on finer grids: set limits, or "
             "add the effect armature or acceleration_cost to the scene"
         )
 
 
-def whirl(solution: Solution) -> Whirl | None:
-    """The light joint without a velocity limit that whirls most; None if none does."""
+def spin(solution: Solution) -> Spin | None:
+    """The light joint without a velocity limit that spins most; None if none does."""
     problem, trajectory = solution.problem, solution.trajectory
     assert problem is not None
     if not (problem.about_robot and problem.ld.lagrangian.needs_torques):
@@ -112,48 +112,48 @@ def whirl(solution: Solution) -> Whirl | None:
         return None
     distance = np.abs(problem.robot.difference(q[:-1], q[1:]).sum(axis=0))  # with full turns
     unit = (np.pi + distance) / trajectory.duration
-    if np.max(np.abs(trajectory.v) / unit) < WHIRLING_RATIO / 2:  # too slow between nodes, too
+    if np.max(np.abs(trajectory.v) / unit) < SPINNING_RATIO / 2:  # too slow between nodes, too
         return None
     N = trajectory.grid.intervals
     k, s = np.repeat(np.arange(N), SAMPLES), np.tile(np.linspace(0.0, 1.0, SAMPLES), N)
     v = np.abs(trajectory.jet_intervals(k, s)[1])
     ratio = v.max(axis=0) / unit
     worst = int(joints[np.argmax(ratio[joints])])
-    if ratio[worst] <= WHIRLING_RATIO:
+    if ratio[worst] <= SPINNING_RATIO:
         return None
     diagonal = np.diagonal(MassMatrix(problem.scene.model)(q), axis1=1, axis2=2)
     inertia = float(diagonal[:, worst].min())
     if inertia > MAX_INERTIA_SHARE * diagonal[:, joints].max():
         return None
     name, speed = trajectory.coordinate_names[worst], float(v[:, worst].max())
-    return Whirl(name, speed, float(ratio[worst]), inertia)
+    return Spin(name, speed, float(ratio[worst]), inertia)
 
 
-def whirl_without_limits(solution: Solution) -> Whirl | None:
-    """The joint that whirls most; None if none does, and within limits. Distances are no limits."""
+def spin_without_limits(solution: Solution) -> Spin | None:
+    """The joint that spins most; None if none does, and within limits. Distances are no limits."""
     assert solution.problem is not None
-    return None if solution.problem.has_limits else whirl(solution)
+    return None if solution.problem.has_limits else spin(solution)
 
 
-def fault_of_whirling(
+def fault_of_spinning(
     solution: Solution, error: float | None, finer: FinerSolution | None = None
 ) -> str:
-    """Why a minimum in which a joint whirls is not trusted; "" if it is, or if no joint whirls.
+    """Why a minimum in which a joint spins is not trusted; "" if it is, or if no joint spins.
 
     error: relative error of the cost; None if the cost is only rounding. finer: the finer solution
         that it was compared with; None to compute it.
     """
-    whirling = whirl_without_limits(solution)
-    if whirling is None:
+    spinning = spin_without_limits(solution)
+    if spinning is None:
         return ""
-    if not whirling.is_trusted(error):
+    if not spinning.is_trusted(error):
         known = "" if error is None else f", with an error of {100 * error:.2g} % of the cost,"
-        return f"at {whirling.speed:.3g} rad/s{known} a finer grid may find another motion"
-    if error is None or not whirling.is_doubtful:
+        return f"at {spinning.speed:.3g} rad/s{known} a finer grid may find another motion"
+    if error is None or not spinning.is_doubtful:
         return ""
-    if _is_confirmed(solution, finer, whirling.largest_error):
+    if _is_confirmed(solution, finer, spinning.largest_error):
         return ""
-    return f"at {whirling.speed:.3g} rad/s a finer grid confirms it, but a still finer one does not"
+    return f"at {spinning.speed:.3g} rad/s a finer grid confirms it, but a still finer one does not"
 
 
 def fault_of_distance(
@@ -162,11 +162,11 @@ def fault_of_distance(
     """Why a minimum without limits whose finer solution is FAR away is not trusted; "" if it is.
 
     It is trusted if a still finer solution is much closer to the finer one than that is to it, or
-    if its error is at most MAX_WHIRLING_ERROR. The arguments are those of `fault_of_whirling`.
+    if its error is at most MAX_SPINNING_ERROR. The arguments are those of `fault_of_spinning`.
     """
     problem = solution.problem
     assert problem is not None
-    if problem.limited or error is None or error <= MAX_WHIRLING_ERROR:
+    if problem.limited or error is None or error <= MAX_SPINNING_ERROR:
         return ""
     try:
         finer = finer or finer_than(solution)
@@ -186,7 +186,7 @@ def fault_of_distance(
 def _is_confirmed(solution: Solution, finer: FinerSolution | None, largest: float) -> bool:
     """Whether the finer solution of a minimum has one nearby on a still finer grid.
 
-    A valley along which a joint whirls may have a minimum on one grid and on the next, but none on
+    A valley along which a joint spins may have a minimum on one grid and on the next, but none on
     finer ones. largest: relative difference of the costs on the two finer grids.
     """
     try:
@@ -219,12 +219,12 @@ def _distance(solution: Solution, finer: FinerSolution) -> float:
     return float(np.abs(finer.problem.coordinates.difference(q, other)).max())
 
 
-def whirl_without_minimum(solution: Solution) -> Whirl | None:
-    """The joint that whirls hopelessly in a motion at its iteration limit; None if none does."""
+def spin_without_minimum(solution: Solution) -> Spin | None:
+    """The joint that spins hopelessly in a motion at its iteration limit; None if none does."""
     problem = solution.problem
     if solution.status is not Status.ITERATION_LIMIT or problem is None:
         return None
-    found = whirl_without_limits(solution)
+    found = spin_without_limits(solution)
     hopeless = found is not None and found.is_hopeless(grids=0, alone=0, nearly_resolved=False)
     return found if hopeless else None
 

@@ -1,4 +1,4 @@
-"""Light joints that whirl without limits are named, with what helps."""
+"""Light joints that spin without limits are named, with what helps."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ def xarm() -> hovi.Scene:
     return hovi.Scene(hovi.load_robot("xarm7"), [hovi.effects.Gravity()])
 
 
-def test_a_whirling_wrist_is_named_with_its_inertia(xarm: hovi.Scene) -> None:
+def test_a_spinning_wrist_is_named_with_its_inertia(xarm: hovi.Scene) -> None:
     found = hovi.plan(xarm, *XARM_REACH, limits="none", self_collision=False)
     assert found.status is hovi.Status.UNRESOLVED
     named = re.search(
-        r"joint '(\S+)' whirls at up to (\S+) rad/s with an inertia of (\S+) kg", found.message
+        r"joint '(\S+)' spins at up to (\S+) rad/s with an inertia of (\S+) kg", found.message
     )
     assert named is not None
     joint = xarm.robot.coordinate_names.index(named[1])
@@ -55,7 +55,7 @@ def test_info_names_light_joints_beforehand(xarm: hovi.Scene) -> None:
     assert "little inertia" not in hovi.load_robot(hovi.example("two_link.urdf")).describe()
 
 
-def test_a_whirling_motion_that_a_finer_grid_leaves_is_no_minimum(
+def test_a_spinning_motion_that_a_finer_grid_leaves_is_no_minimum(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Two more modes change its cost by 0.5 %, intervals of a quarter by 3 %."""
@@ -76,7 +76,7 @@ def test_a_whirling_motion_that_a_finer_grid_leaves_is_no_minimum(
 
 
 @pytest.fixture(scope="module")
-def whirling_z1() -> hovi.Solution:
+def spinning_z1() -> hovi.Solution:
     """Two more modes change its cost by 0.1 %, intervals of a quarter by 1.2 %, 3 rad away."""
     scene = hovi.Scene(hovi.load_robot("z1", locked=["jointGripper"]), [hovi.effects.Gravity()])
     start = [0.06222511, 1.94983376, -0.15340647, 1.26122452, 0.59194828, -2.10693647]
@@ -87,9 +87,9 @@ def whirling_z1() -> hovi.Solution:
 
 
 def test_a_later_grid_that_is_left_unfinished_refutes_an_estimate(
-    whirling_z1: hovi.Solution,
+    spinning_z1: hovi.Solution,
 ) -> None:
-    found, accuracy = whirling_z1, whirling_z1.accuracy
+    found, accuracy = spinning_z1, spinning_z1.accuracy
     assert found.status is hovi.Status.UNRESOLVED, found.message
     assert accuracy is not None
     assert found.problem is not None
@@ -100,23 +100,23 @@ def test_a_later_grid_that_is_left_unfinished_refutes_an_estimate(
     assert found.error_estimate == pytest.approx(found.cost / lower.min() - 1, rel=1e-3)
 
 
-def test_a_fast_whirling_motion_needs_a_minimum_on_two_finer_grids(
-    whirling_z1: hovi.Solution,
+def test_a_fast_spinning_motion_needs_a_minimum_on_two_finer_grids(
+    spinning_z1: hovi.Solution,
 ) -> None:
     """Two more modes hardly change its cost; shorter intervals lead to another motion."""
-    problem, motion = whirling_z1.problem, whirling_z1.trajectory
+    problem, motion = spinning_z1.problem, spinning_z1.trajectory
     assert problem is not None
-    error = 1 - solve_on_grid(problem.finer, motion).cost / whirling_z1.cost
+    error = 1 - solve_on_grid(problem.finer, motion).cost / spinning_z1.cost
     assert error < 1e-3
     again = hovi.solve(problem, motion)
-    assert again.cost == pytest.approx(whirling_z1.cost, rel=1e-9)
+    assert again.cost == pytest.approx(spinning_z1.cost, rel=1e-9)
     assert again.status is hovi.Status.UNRESOLVED
     assert "but a still finer one does not" in again.message
     quarters = problem.on(problem.grid.halved().halved())
-    assert solve_on_grid(quarters, motion).cost < 0.99 * whirling_z1.cost
+    assert solve_on_grid(quarters, motion).cost < 0.99 * spinning_z1.cost
 
 
-def test_a_fast_whirling_motion_that_finer_grids_confirm_is_a_minimum() -> None:
+def test_a_fast_spinning_motion_that_finer_grids_confirm_is_a_minimum() -> None:
     """A light wrist turns fast in it. Replanned farther away, it is compared anew."""
     scene = hovi.Scene(hovi.load_robot("ur5"), [hovi.effects.Gravity()])
     start, goal, duration = UR5_REACH
