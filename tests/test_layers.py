@@ -30,6 +30,7 @@ WITH_ORACLES = {
     "optimize/test_constrained_model.py",
     "optimize/test_merge_tree.py",
     "oracles/on_grid.py",
+    "planning/conditions/test_derivatives.py",
     "planning/refinement/test_hp_refinement.py",
     "planning/solver/limits/test_limit_rows.py",
     "samples/interval_problems.py",
