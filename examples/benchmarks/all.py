@@ -51,7 +51,7 @@ PEER = [f"--peer={os.environ['TASKS_PEER']}"] if "TASKS_PEER" in os.environ else
 LONG = {
     "tasks": ("tasks.py", *PEER),
     "receding_noise": ("receding_noise.py",),
-    "rules": ("rules.py", "--full", "--store", "rules.json"),
+    "rules": ("rules.py", "--full"),
     "self_collision": ("self_collision.py", "--count", "12"),
     "hard_cases_long": ("hard_cases.py", "long"),
     "limited_reaches_ipopt": ("limited_reaches.py", "--ipopt"),

@@ -8,6 +8,7 @@ its place: on all others it changes nothing. Everything is deterministic, whatev
 
     python rules.py [NAME ...]              # the screening corpus, 15 s; some rules, or all of them
     python rules.py --full --store FILE     # the full corpus; FILE keeps what was measured
+    python rules.py --full --store FILE --known    # the tables of that alone
 
 Who adds a rule adds its row to rules_list.py; tests/test_rules.py resolves all switches.
 """
@@ -104,7 +105,7 @@ def without(off: Sequence[str], name: str, most: float) -> Result:
 class Measured:
     """What was measured, by job; a file keeps it from run to run.
 
-    path: of the file; None for none. processes: that measure at a time.
+    path: of the file; None for none. processes: that measure at a time; 0 to measure nothing.
     """
 
     def __init__(self, path: Path | None, processes: int) -> None:
@@ -114,6 +115,8 @@ class Measured:
     def add(self, jobs: dict[str, partial]) -> None:
         """Run the jobs that are not known, by their keys."""
         left = {key: job for key, job in jobs.items() if key not in self.known}
+        if self.processes == 0:
+            return
         for number, (key, found) in enumerate(self._results(left), 1):
             self.known[key] = found
             if number % 20 == 0:
@@ -138,9 +141,10 @@ class Corpus:
     """A corpus with its noise. names: of its problems."""
 
     def __init__(self, names: Sequence[str], measured: Measured) -> None:
-        self.names, self.measured = names, measured
         measured.add({f"with all/{n}": partial(with_all, n) for n in names})
         measured.add({f"nudged {i}/{n}": partial(solved, n, i) for i in NUDGES for n in names})
+        self.measured, last = measured, f"nudged {max(NUDGES)}"
+        self.names = [n for n in names if f"{last}/{n}" in measured.known]
 
     def all_on(self, name: str) -> Result:
         """A problem with all rules."""
@@ -167,9 +171,9 @@ class Corpus:
 
     def effect(self, off: Sequence[str]) -> Effect:
         """The effect of rules that were turned off together."""
-        names = list(self.reached(off))
-        key = f"without {' + '.join(off)}"
-        return Effect(self, names, {n: tuple(self.measured.known[f"{key}/{n}"]) for n in names})
+        known, key = self.measured.known, f"without {' + '.join(off)}"
+        names = [n for n in self.reached(off) if f"{key}/{n}" in known]
+        return Effect(self, names, {n: tuple(known[f"{key}/{n}"]) for n in names})
 
 
 class Effect:
@@ -191,6 +195,11 @@ class Effect:
         self.points, self.points_noise = _ratios(both, found, known, 3)
 
     @property
+    def known(self) -> str:
+        """How many problems changed, of all that were measured."""
+        return f"{len(self.changed)} of {len(self.names)}"
+
+    @property
     def beyond_noise(self) -> bool:
         """Whether any of it is more than starts moved by 1e-9 do."""
         figures = (self.steps, self.steps_noise), (self.points, self.points_noise)
@@ -206,11 +215,11 @@ class Effect:
     def cells(self) -> list[str]:
         """Changed problems, successes, steps, points and costs, for a table."""
         if not self.changed:
-            return ["0", "", "", "", ""]
+            return [self.known if self.names else "", "", "", "", ""]
         lost = [f"{sign}{len(x)}" for x, sign in ((self.lost, "-"), (self.gained, "+")) if x]
         costs = [f"{len(x)} {up}" for x, up in ((self.dearer, "up"), (self.cheaper, "down")) if x]
         return [
-            str(len(self.changed)),
+            self.known,
             ", ".join(lost),
             _shown(self.steps, self.steps_noise),
             _shown(self.points, self.points_noise),
@@ -304,7 +313,7 @@ def table_of_groups(corpus: Corpus, groups: Sequence[Sequence[str]]) -> None:
     rows = []
     for group in groups:
         effect = corpus.effect(group)
-        if len(group) > 2 or effect.beyond_noise:
+        if effect.names and (len(group) > 2 or effect.beyond_noise):
             rows.append([", ".join(group), str(len(group)), *effect.cells()])
     print_table(["off together", "rules", "changed", "successes", "steps", "points", "costs"], rows)
 
@@ -322,10 +331,10 @@ def describe(corpus: Corpus) -> None:
         f"{min(good[1:])} to {max(good[1:])}, steps {steps} and kernel points {points} times as "
         "many, as geometric means.\n\n"
         "*reached*: on how many problems, and how often, the rule's expression had another value "
-        "than what takes its place. The rest compares these problems without the rule: *changed* "
-        "in any bit; *successes* lost (-) and gained (+); *steps* and *points* as ratios, in "
-        "parentheses where moved starts spread as much; *costs* that rise or fall by more than "
-        "1e-4 and twice that spread.\n"
+        "than what takes its place. The rest compares problems without the rule: *changed* in any "
+        "bit, of those that were tried; *successes* lost (-) and gained (+); *steps* and *points* "
+        "as ratios, in parentheses where moved starts spread as much; *costs* that rise or fall "
+        "by more than 1e-4 and twice that spread.\n"
     )
 
 
@@ -335,10 +344,11 @@ def main() -> None:
     parser.add_argument("--full", action="store_true", help="the full corpus")
     parser.add_argument("--store", type=Path, metavar="FILE", help="keeps what was measured")
     parser.add_argument("--processes", type=int, default=1, metavar="N")
+    parser.add_argument("--known", action="store_true", help="tables of what the file has")
     given = parser.parse_args()
     rules = [rule for rule in RULES if not given.rules or rule.name in given.rules]
     names = list(PROBLEMS) if given.full else SCREENING
-    corpus = Corpus(names, Measured(given.store, given.processes))
+    corpus = Corpus(names, Measured(given.store, 0 if given.known else given.processes))
     corpus.measure([[rule.name] for rule in rules])
     quiet = [rule.name for rule in rules if not corpus.effect([rule.name]).beyond_noise]
     quiet = [name for name in quiet if corpus.reached([name])]

@@ -357,7 +357,7 @@ _rule(
 )
 _rule(
     "drop saved iterates",
-    "Marked points with a smaller mu are dropped where mu is raised.",
+    "Saved iterates with a smaller mu are dropped where mu is raised.",
     "_Iteration._drop_saved",
     "each[0] > mu",
     "True",
