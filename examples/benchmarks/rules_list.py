@@ -1097,13 +1097,6 @@ _rule(
     "not search.start.near",
     "False",
 )
-_rule(
-    "saved iterates of like durations",
-    "Points of a solve that moves the duration are kept within a tenth of the last.",
-    "TimedSearch._at_its_duration",
-    "abs(T / x.duration - 1.0) <= SAME_DURATION",
-    "True",
-)
 _at("durations", "planning.search.free_duration")
 _rule(
     "failed duration again from near",

@@ -35,8 +35,6 @@ LAST_DECREASE = 1e-11
 relative error of the slope in the duration."""
 ROUGH_DECREASE = 1e-3
 """Relative decrease at which the motion of the first duration is good enough to be stretched."""
-SAME_DURATION = 1e-1
-"""Relative difference of a duration from the last one up to which a motion is on the way to it."""
 ROUGH_BARRIER = 1e-2
 """Its last barrier parameter, with which the next solve begins."""
 
@@ -115,7 +113,6 @@ class TimedSearch(BoundedSearch):
         saved = [
             (fraction * product, self.problem.moved(stretched_path(x.path, T / x.duration)))
             for product, x in found.saved
-            if abs(T / x.duration - 1.0) <= SAME_DURATION
         ]
         return Ended(
             found.x.path,
