@@ -270,13 +270,6 @@ _rule(
     "False",
 )
 _rule(
-    "end after a short step",
-    "A cut step ends a solve if it predicts 1e-4 of what is enough for a whole one.",
-    "_Iteration._finished",
-    "step.remaining <= SHORT_STEP_FRACTION * enough",
-    "False",
-)
-_rule(
     "end without equations",
     "Four steps that predict nothing end a solve although equations do not hold.",
     "_Iteration._finished",

@@ -50,8 +50,6 @@ INITIAL_MU = 0.1
 """First barrier parameter, relative to the mean density of the objective."""
 WHOLE_STEP = 0.9
 """Fraction of a step from which it is a whole one, after which little remains."""
-SHORT_STEP_FRACTION = 1e-4
-"""Decrease that may remain where the last step was no whole one, relative to that of whole ones."""
 FIRST_REFINEMENT = 1e-2
 """Mean product z gap, relative to the mean density, below which outputs are first refined."""
 NEXT_REFINEMENT = 0.1
@@ -308,10 +306,8 @@ class _Iteration(BoundedSteps[X]):
         last = step.barrier.mu <= 1.01 * self.final_mu and self.product <= 10.0 * self.final_mu
         enough = max(self.criteria.decrease, self.criteria.enough) * self.scale()
         whole = accepted and step.fraction >= WHOLE_STEP
-        small = step.remaining <= SHORT_STEP_FRACTION * enough
-        if whole:
-            small = max(step.remaining, step.decrease) <= enough
-        if not (last and small and step.trial.newton and self.ended.feasible):
+        small = max(step.remaining, step.decrease) <= enough
+        if not (last and whole and small and step.trial.newton and self.ended.feasible):
             return False
         self.unmet = 0 if self.objective.meets_equations(self.ended.x) else self.unmet + 1
         return self.unmet % MAX_UNMET == 0
