@@ -169,6 +169,11 @@ class Corpus:
                 jobs[f"without {' + '.join(off)}/{name}"] = partial(without, off, name, most)
         self.measured.add(jobs)
 
+    def known_groups(self) -> list[list[str]]:
+        """The groups that were turned off."""
+        keys = [key.removeprefix("without ") for key in self.measured.known if " + " in key]
+        return [names.split(" + ") for names in dict.fromkeys(key.split("/")[0] for key in keys)]
+
     def effect(self, off: Sequence[str]) -> Effect:
         """The effect of rules that were turned off together."""
         known, key = self.measured.known, f"without {' + '.join(off)}"
@@ -353,6 +358,7 @@ def main() -> None:
     quiet = [rule.name for rule in rules if not corpus.effect([rule.name]).beyond_noise]
     quiet = [name for name in quiet if corpus.reached([name])]
     groups = [*quiet_groups(corpus, quiet), *mechanisms(corpus, quiet)]
+    groups = corpus.known_groups() if given.known else groups
     describe(corpus)
     table_of(corpus, rules)
     table_of_groups(corpus, groups)
