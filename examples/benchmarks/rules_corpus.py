@@ -231,7 +231,7 @@ for _name in ("ur5_past_ball", "ur5_around_sphere", "panda_reach_limited", "cart
     _problem(f"scene {_name}", _name.startswith("cart"))(_scene(_name))
 for _name in ("acrobot_swing_up", "pendubot_swing_up", "two_link_elbow_limited"):
     _problem(f"scene {_name}", _name.startswith("pend"))(_scene(_name))
-for _name in ("panda_pick_and_place", "two_link_pick", "panda_lift", "ur5_reach"):
+for _name in ("panda_pick", "panda_pick_and_place", "two_link_pick", "panda_lift", "ur5_reach"):
     _problem(f"scene {_name}", _name == "two_link_pick")(_scene(_name))
 for _name in ("spacecraft_reorients", "solo_in_flight", "flying_body_flip", "panda_reach_rich"):
     _problem(f"scene {_name}")(_scene(_name))
