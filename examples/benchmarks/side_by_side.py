@@ -89,6 +89,7 @@ class Worker:
                 stderr=log,
                 text=True,
                 env=os.environ | one,
+                process_group=0,  # which Ctrl-C does not reach
             )
         lines: queue.Queue[str | None] = queue.Queue()
         threading.Thread(target=_forward, args=(process.stdout, lines), daemon=True).start()
