@@ -14,9 +14,8 @@ from hovi.planning.conditions.condition import Bounded, Condition, Equation, bou
 from hovi.planning.conditions.places import AtNode, AtTimes
 from hovi.planning.conditions.sets import Between
 from hovi.robot.space.coordinates import Coordinates
+from hovi.scene.segmented_lagrangian import NODE_TOLERANCE
 
-NODE_TOLERANCE = 1e-9
-"""Distance of a node from a time, relative to the duration, at which it counts as there."""
 Given = Sequence[Condition[Any, Any]]
 
 

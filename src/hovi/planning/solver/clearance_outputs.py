@@ -7,7 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
+from hovi.discrete.trajectory import Trajectory
 from hovi.planning.clearance.clearance import DISTANCE_SCALE
+from hovi.planning.clearance.clearance_violation import approach_along, approach_sentence
 from hovi.planning.clearance.distances import Distances
 from hovi.planning.conditions.function import Points
 from hovi.planning.solver.point_outputs import ExpandedOutputs, PointOutputs
@@ -26,12 +28,13 @@ class ClearanceOutputs(PointOutputs):
     phi(d) = d for near pairs and constant for far ones, with two continuous derivatives: far
     pairs have no influence, and need no derivatives.
 
-    distances: of the pairs. least: lower bound, in [m].
+    distances: of the pairs. least: lower bound, in [m]. between: that between the points.
     """
 
-    def __init__(self, distances: Distances, least: float) -> None:
+    def __init__(self, distances: Distances, least: float, between: float | None = None) -> None:
         self.distances = distances
         self.least = least
+        self.between = least if between is None else between
         self._last: tuple[Array, Array] | None = None
 
     def restricted(self, pairs: Sequence[int]) -> ClearanceOutputs:
@@ -62,6 +65,19 @@ class ClearanceOutputs(PointOutputs):
         bending = (force * bend)[:, :, None] * jacobian
         curvature += np.matmul(jacobian.transpose(0, 2, 1), bending)
         return ExpandedOutputs(slope[:, :, None] * jacobian, curvature)
+
+    def excess(self, trajectory: Trajectory, tolerance: float) -> Array:
+        """By how much pairs are nearer than they may be, in DISTANCE_SCALE, (2, N, K)."""
+        approach = approach_along(trajectory, self.distances, self.between)
+        short = (self.between - approach.distance) / DISTANCE_SCALE
+        return np.stack([short, np.full_like(short, -np.inf)])
+
+    def worst(self, trajectory: Trajectory, tolerance: float) -> tuple[float, str]:
+        """The pair that comes closest."""
+        approach = approach_along(trajectory, self.distances, self.between)
+        margin = self.between - tolerance * DISTANCE_SCALE
+        short = (self.between - approach.distance).max() / DISTANCE_SCALE
+        return float(short), approach_sentence(trajectory, self.distances, approach, margin)
 
     def _excess(self, q: Array) -> Array:
         """Distances beyond the least one, in DISTANCE_SCALE; those of the last points are kept."""

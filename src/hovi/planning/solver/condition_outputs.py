@@ -10,9 +10,11 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from hovi.discrete.trajectory import Trajectory
 from hovi.planning.conditions.condition import scales
 from hovi.planning.conditions.function import Curvature, Points, Slopes
 from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.solver.condition_excess import ConditionBounds
 from hovi.planning.solver.point_outputs import ExpandedOutputs, PointOutputs, Range
 
 Array = npt.NDArray[np.float64]
@@ -53,6 +55,15 @@ class ConditionOutputs(PointOutputs):
         """y over its scale, (P, K)."""
         found = zip(self.given, self._scales, strict=True)
         return np.concatenate([each.y.values(at) / scale for each, scale in found], axis=1)
+
+    def excess(self, trajectory: Trajectory, tolerance: float) -> Array:
+        """See PointOutputs: with the conditions' own tolerances."""
+        parts = [ConditionBounds(each).excess(trajectory, tolerance) for each in self.given]
+        return np.concatenate(parts, axis=2)
+
+    def worst(self, trajectory: Trajectory, tolerance: float) -> tuple[float, str]:
+        """The condition that is exceeded most, in shares of its scale."""
+        return max(ConditionBounds(each).worst(trajectory) for each in self.given)
 
     def expand(self, at: Points, force: Array) -> ExpandedOutputs:
         """Derivatives in (q, v, a): see the module."""

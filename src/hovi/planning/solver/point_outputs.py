@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from hovi.discrete.trajectory import Trajectory
 from hovi.planning.conditions.function import Points
 
 Array = npt.NDArray[np.float64]
@@ -42,6 +43,17 @@ class PointOutputs(ABC):
     @abstractmethod
     def expand(self, at: Points, force: Array) -> ExpandedOutputs:
         """The derivatives of y; force: weights of the outputs' curvature, shape (P, K)."""
+
+    @abstractmethod
+    def excess(self, trajectory: Trajectory, tolerance: float) -> Array:
+        """The excess over lower and upper bounds in every interval, (2, N, K); -inf for none.
+
+        Between the points, too. What is tolerated is at most the tolerance.
+        """
+
+    @abstractmethod
+    def worst(self, trajectory: Trajectory, tolerance: float) -> tuple[float, str]:
+        """The largest excess, and what exceeds its bound then and when, as a clause."""
 
     def bounds(self, t: Array) -> Range:
         """Lower and upper bounds at P times, (P, K) each: from zero on by default."""
@@ -82,6 +94,15 @@ class JointOutputs(PointOutputs):
         torques = [each.torques for each in found if each.torques is not None]
         total = np.sum(torques, axis=0) if torques else None
         return ExpandedOutputs(np.concatenate(J, axis=1), np.sum(H, axis=0), total)
+
+    def excess(self, trajectory: Trajectory, tolerance: float) -> Array:
+        """Those of all parts."""
+        parts = [part.excess(trajectory, tolerance) for part in self.parts]
+        return np.concatenate(parts, axis=2)
+
+    def worst(self, trajectory: Trajectory, tolerance: float) -> tuple[float, str]:
+        """The largest of any part."""
+        return max(part.worst(trajectory, tolerance) for part in self.parts)
 
     def bounds(self, t: Array) -> Range:
         """Those of all parts."""

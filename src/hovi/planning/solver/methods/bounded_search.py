@@ -10,7 +10,6 @@ import numpy.typing as npt
 
 from hovi.discrete.grid import DiscretePath
 from hovi.discrete.instants import Instants
-from hovi.discrete.trajectory import Trajectory
 from hovi.optimize.banded_model import BandModel
 from hovi.optimize.barrier import INITIAL_MARGIN, WARM_START_MARGIN, Barrier
 from hovi.optimize.bordered_model import EquationModel
@@ -40,7 +39,6 @@ from hovi.planning.solver.augmented_lagrangian_rounds import (
 from hovi.planning.solver.bounded_action import BoundedAction
 from hovi.planning.solver.central_path import CentralPath
 from hovi.planning.solver.clearance_outputs import EXTRA_CLEARANCE, ClearanceOutputs
-from hovi.planning.solver.condition_excess import ConditionBounds
 from hovi.planning.solver.condition_outputs import ConditionOutputs
 from hovi.planning.solver.limits.graded_parts import GivenEnds
 from hovi.planning.solver.limits.limit_rows import LimitRows
@@ -49,7 +47,7 @@ from hovi.planning.solver.methods.method import Guess, Report
 from hovi.planning.solver.multipliers import Multipliers
 from hovi.planning.solver.near.clearance_rows import ClearanceRows
 from hovi.planning.solver.near.cleared_action import ClearedAction
-from hovi.planning.solver.point_outputs import joint_outputs
+from hovi.planning.solver.point_outputs import PointOutputs, joint_outputs
 from hovi.scene.lagrangian import PointTerms
 from hovi.system.dataclass import dataclass
 from hovi.system.deadline import Deadline, raise_if_late
@@ -116,7 +114,8 @@ class BoundedSearch:
         if distances is not None and self.lazy:
             self.near = self.no_near_rows()
         elif distances is not None:
-            self.clearance = ClearanceOutputs(distances, self.bounded_distance)
+            least = self.bounded_distance, self.least_distance
+            self.clearance = ClearanceOutputs(distances, *least)
         self.margins = self.no_margins()
         if self.along is not None and not self.along.fits(self.problem.grid):
             self.along = None  # a round before has halved intervals
@@ -140,9 +139,14 @@ class BoundedSearch:
 
     def no_margins(self) -> Array:
         """Zero margins, shape (2, N, kinds nv + pairs + values of conditions)."""
-        more = sum(each.y.size for each in self.problem.bounds)
-        more += 0 if self.clearance is None else self.clearance.size
+        more = 0 if self.more is None else self.more.size
         return np.zeros((2, self.problem.grid.intervals, self.limits.lower.size + more))
+
+    @property
+    def more(self) -> PointOutputs | None:
+        """What is bounded at the points beside limits: distances, and then conditions."""
+        conditions = ConditionOutputs(self.problem) if self.problem.bounds else None
+        return joint_outputs(self.clearance, conditions)
 
     def coarse_rows(self) -> LimitRows:
         """Limits at all times, by few control points."""
@@ -182,8 +186,7 @@ class BoundedSearch:
         return objective
 
     def _objective(self, known: Multipliers | None, algebra: LinearAlgebra | None) -> BoundedAction:
-        conditions = ConditionOutputs(self.problem) if self.problem.bounds else None
-        more = joint_outputs(self.clearance, conditions)
+        more = self.more
         if self.near is not None:
             common = self.problem, self.limits, self.margins, algebra, known, more
             cleared = ClearedAction(*common, self.rows, self.near)
@@ -372,20 +375,11 @@ class BoundedSearch:
         """
         trajectory = self.problem.trajectory(path)
         both = excess_of(trajectory, self.limits, self.rows.of.others(self.limits))
-        sides = [np.stack(both).reshape(2, len(both[0]), -1)]
-        if self.clearance is not None:
-            least = self.least_distance
-            approach = approach_along(trajectory, self.clearance.distances, least)
-            short = (least - approach.distance) / DISTANCE_SCALE
-            sides.append(np.stack([short, np.full_like(short, -np.inf)]))
-        tolerance = self.limits.tolerance
-        sides += [ConditionBounds(x).excess(trajectory, tolerance) for x in self.problem.bounds]
-        return np.concatenate(sides, axis=2) if len(sides) > 1 else sides[0]
-
-    def _worst_condition(self, trajectory: Trajectory) -> tuple[float, str]:
-        """The largest excess of a condition, as a fraction of its scale, and what it is."""
-        found = [ConditionBounds(each).worst(trajectory) for each in self.problem.bounds]
-        return max(found, default=(-np.inf, ""))
+        sides = np.stack(both).reshape(2, len(both[0]), -1)
+        if self.more is None:
+            return sides
+        further = self.more.excess(trajectory, self.limits.tolerance)
+        return np.concatenate([sides, further], axis=2)
 
     def too_close(self, path: DiscretePath) -> str:
         """Which pair comes closer than the margin where there are rows of distances; "" if none."""
@@ -402,16 +396,9 @@ class BoundedSearch:
     def worst(self, path: DiscretePath) -> str:
         """The limit, distance or condition that is violated most: what, and when."""
         trajectory = self.problem.trajectory(path)
-        excess, clause = self._worst_condition(trajectory)
-        if excess > excess_along(trajectory, self.limits, refined=False).worst:
-            return clause
-        if self.clearance is not None:
-            first = self.limits.lower.size
-            short = self.excess(path)[:, :, first : first + self.clearance.size].max()
-            if short >= excess_along(trajectory, self.limits, refined=False).worst:
-                distances, least = self.clearance.distances, self.least_distance
-                approach = approach_along(trajectory, distances, least)
-                margin = least - self.limits.tolerance * DISTANCE_SCALE
-                return approach_sentence(trajectory, distances, approach, margin)
+        if self.more is not None:
+            excess, clause = self.more.worst(trajectory, self.limits.tolerance)
+            if excess >= excess_along(trajectory, self.limits, refined=False).worst:
+                return clause
         sentence = worst_sentence(trajectory, self.limits, self.problem.coordinates)
         return sentence + static_sentence(self.problem, self.limits)
