@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 from dataclasses import field
 from typing import TYPE_CHECKING, Any
 
@@ -10,7 +11,7 @@ from hovi.discrete.grid import DiscretePath
 from hovi.discrete.instants import Instants
 from hovi.discrete.interval_batch import Jet
 from hovi.discrete.trajectory import Trajectory
-from hovi.optimize.ended import Iteration
+from hovi.optimize.ended import Iteration, Reason
 from hovi.optimize.quadratic_model import QuadraticModel
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.limits.row_forces import at_instants
@@ -19,6 +20,8 @@ from hovi.planning.solver.outcome.cost_with_time import cost_of
 from hovi.planning.solver.status import Status
 from hovi.scene.lagrangian import PointTerms
 from hovi.system.dataclass import dataclass
+from hovi.system.deadline import OutOfTimeError
+from hovi.system.interruption import record_interrupt
 
 if TYPE_CHECKING:
     from hovi.planning.solver.central_path import CentralPath
@@ -96,3 +99,17 @@ class Answer:
         ld = at_instants(problem, self.instants).ld
         momenta = accumulated_momenta(ld.derivatives(self.path, self.forces, self.jets))
         return problem.motion(self.path, momenta, metadata)
+
+
+def answered(solve: Callable[[], Answer], stopped: Callable[[Reason], Answer]) -> Answer:
+    """What a solve answers, or what there is where Ctrl-C or its time limit end it.
+
+    Iterations return their current point themselves; this is for the time between them.
+    """
+    try:
+        return solve()
+    except KeyboardInterrupt:
+        record_interrupt()
+        return stopped(Reason.INTERRUPTED)
+    except OutOfTimeError:
+        return stopped(Reason.TIME_LIMIT)

@@ -7,7 +7,7 @@ import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import field
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -28,7 +28,7 @@ from hovi.planning.problem.notation.ends import End
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.problem.tolerance import LAST_BARRIER, REMAINING_SHARE, Accuracy
 from hovi.planning.problem.units import as_time_limit, seconds
-from hovi.planning.solver.answer import Answer
+from hovi.planning.solver.answer import Answer, answered
 from hovi.planning.solver.initial_path import guess_path, turned_on
 from hovi.planning.solver.limits.row_forces import at_instants
 from hovi.planning.solver.longer_way_back import minimized
@@ -59,7 +59,7 @@ from hovi.scene.lagrangian import PointTerms
 from hovi.system.blas_threads import one_blas_thread
 from hovi.system.dataclass import dataclass
 from hovi.system.deadline import Deadline, OutOfTimeError, raise_if_late
-from hovi.system.interruption import interruptible, record_interrupt
+from hovi.system.interruption import interruptible
 
 if TYPE_CHECKING:
     from hovi.planning.solver.central_path import CentralPath
@@ -357,17 +357,13 @@ def solve_on_grid(
         barrier=barrier,
         enough=REMAINING_SHARE * barrier,
     )
-    started = time.perf_counter()
-    try:
+    started, start = time.perf_counter(), dataclasses.replace(begun, x=path)
+
+    def solved() -> Answer:
         with Deadline(time_limit).in_force():
-            result = minimized(
-                method, problem, dataclasses.replace(begun, x=path), criteria, report
-            )
-    except KeyboardInterrupt:  # outside the iterations, which return their current point
-        record_interrupt()
-        result = _the_guess(problem, path, Reason.INTERRUPTED)
-    except OutOfTimeError:
-        result = _the_guess(problem, path, Reason.TIME_LIMIT)
+            return minimized(method, problem, start, criteria, report)
+
+    result = answered(solved, partial(_the_guess, problem, path))
     return solution_of(result, started - began, time.perf_counter() - started)
 
 

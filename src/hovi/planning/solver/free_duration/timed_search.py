@@ -7,6 +7,7 @@ or halvings of intervals, a solve moves the motion and the duration.
 from __future__ import annotations
 
 import dataclasses
+from functools import partial
 
 from hovi.discrete.grid import DiscretePath
 from hovi.optimize.barrier import Barrier
@@ -17,7 +18,7 @@ from hovi.optimize.interior_point import minimize_bounded
 from hovi.optimize.start import Start
 from hovi.planning.problem.limits import Limits
 from hovi.planning.problem.problem import TrajectoryProblem
-from hovi.planning.solver.answer import Answer
+from hovi.planning.solver.answer import Answer, answered
 from hovi.planning.solver.free_duration.timed_bounded_action import TimedBoundedAction
 from hovi.planning.solver.free_duration.timed_path import TimedPath, TimePrice, stretched_path
 from hovi.planning.solver.methods.bounded_search import Begun, Bounded, BoundedSearch
@@ -27,8 +28,7 @@ from hovi.planning.solver.methods.method import Guess
 from hovi.planning.solver.outcome.cost_with_time import cost_of
 from hovi.planning.solver.status import Status, unfinished
 from hovi.system.dataclass import dataclass
-from hovi.system.deadline import OutOfTimeError, raise_if_late
-from hovi.system.interruption import record_interrupt
+from hovi.system.deadline import raise_if_late
 
 LAST_DECREASE = 1e-11
 """Relative decrease at which a motion and its duration are accurate: its square root is the
@@ -48,13 +48,7 @@ def minimum_within_limits(
 ) -> Answer:
     """A motion and a duration of least S + w T within limits, from a guess for the problem's."""
     search = TimedSearch(problem, limits, criteria, None, start, price=price)
-    try:
-        return _searched(search)
-    except KeyboardInterrupt:  # between two solves, which handle their own
-        record_interrupt()
-        return _ended(search, Reason.INTERRUPTED)
-    except OutOfTimeError:
-        return _ended(search, Reason.TIME_LIMIT)
+    return answered(partial(_searched, search), partial(_ended, search))
 
 
 @dataclass(eq=False)

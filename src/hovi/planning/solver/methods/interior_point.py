@@ -14,7 +14,7 @@ from hovi.optimize.ended import STOPPED, Reason
 from hovi.planning.problem.contradictions import contradiction
 from hovi.planning.problem.limits import no_limits
 from hovi.planning.problem.problem import TrajectoryProblem
-from hovi.planning.solver.answer import Answer
+from hovi.planning.solver.answer import Answer, answered
 from hovi.planning.solver.methods.active_pairs import with_active_pairs, without_pairs
 from hovi.planning.solver.methods.bounded_search import BoundedSearch
 from hovi.planning.solver.methods.feasibility import feasible_motion
@@ -24,8 +24,7 @@ from hovi.planning.solver.methods.torque_rates_last import with_torque_rates_las
 from hovi.planning.solver.non_finite import non_finite_condition, non_finite_sentence
 from hovi.planning.solver.outcome.cost_with_time import cost_of
 from hovi.planning.solver.status import Status, diverged, infeasible_sentence, unfinished
-from hovi.system.deadline import Deadline, OutOfTimeError
-from hovi.system.interruption import record_interrupt
+from hovi.system.deadline import Deadline
 
 DistancesAt = Literal["rows", "points"]
 """Where distances are bounded: in rows where pairs come near, or at quadrature points."""
@@ -117,13 +116,7 @@ class InteriorPoint(Method):
             said = infeasible_sentence(reason)
             return Answer.at(problem, start.x, Status.INFEASIBLE, said)
         search = BoundedSearch(problem, limits, criteria, report, start, lazy=lazy)
-        try:
-            return _searched(search)
-        except KeyboardInterrupt:  # between two solves, which handle their own
-            record_interrupt()
-            return _ended(search, Reason.INTERRUPTED)
-        except OutOfTimeError:
-            return _ended(search, Reason.TIME_LIMIT)
+        return answered(partial(_searched, search), partial(_ended, search))
 
 
 def _searched(search: BoundedSearch) -> Answer:
