@@ -44,7 +44,7 @@ LIMITS = "panda"
 """The limit set of the arm."""
 SHARES = (0.002, 0.005, 0.01, 0.02, 0.05)
 """Smoothing times of the heaviest joint, of the duration; `smooth` has the middle one."""
-STATIC_SHARE, DURATIONS = 0.9, (1.5, 3.0)
+STATIC_FRACTION, DURATIONS = 0.9, (1.5, 3.0)
 """Largest static torque at the ends, of its limit; durations, in times at the velocity limits."""
 
 
@@ -187,7 +187,7 @@ def _draw(
     while True:
         ends = random.uniform(lower + inner, upper - inner, (2, scene.robot.nv))
         static = [np.abs(scene.inverse_dynamics(q[None], zero, zero)[0]) for q in ends]
-        if (np.max(static, axis=0) < STATIC_SHARE * limits.upper[3]).all():
+        if (np.max(static, axis=0) < STATIC_FRACTION * limits.upper[3]).all():
             shortest = float(np.max(np.abs(ends[1] - ends[0]) / limits.upper[1]))
             return ends[0], ends[1], max(random.uniform(*DURATIONS) * shortest, 0.5)
 

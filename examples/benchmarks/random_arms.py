@@ -28,7 +28,7 @@ Array = npt.NDArray[np.float64]
 Result = TypeVar("Result")
 
 ARMS = ("ur5", "panda", "z1", "kinova", "xarm7")
-HOLDING_SHARE = 0.9
+HOLDING_FRACTION = 0.9
 """Largest torque that holds a start or goal, as a fraction of its limit."""
 DURATIONS = (1.5, 2.0)
 """Range of the durations, in times at the velocity limits."""
@@ -74,7 +74,7 @@ def random_reaches(scene: hovi.Scene, count: int, seed: int) -> list[Reach]:
         start, goal = rng.uniform(lower, upper, (2, robot.nv))
         zero = np.zeros((2, robot.nv))
         holding = np.abs(rnea(model, np.stack([start, goal]), zero, zero))
-        if (holding <= HOLDING_SHARE * robot.effort_limit).all():
+        if (holding <= HOLDING_FRACTION * robot.effort_limit).all():
             fastest = float(np.max(np.abs(goal - start) / robot.velocity_limit))
             found.append(Reach(start, goal, float(rng.uniform(*DURATIONS)) * fastest))
     return found

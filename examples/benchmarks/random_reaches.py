@@ -25,7 +25,7 @@ ROBOTS = {
     "talos_arm": ["gripper_left_joint"],
 }
 PAIRS, SEED, STARTS = 20, 0, 4
-HOLDING_SHARE = 0.9
+HOLDING_FRACTION = 0.9
 """Fraction of the torque limits allowed for holding start and goal."""
 TIME_LIMIT = 600.0  # [s], of one call of plan
 
@@ -39,7 +39,9 @@ def pairs(scene: hovi.Scene) -> list[tuple[np.ndarray, np.ndarray, float]]:
     random, found = np.random.default_rng(SEED), []
     while len(found) < PAIRS:
         q = random.uniform(lower, upper, (2, robot.nv))
-        held = np.abs(scene.inverse_dynamics(q, 0 * q, 0 * q)) <= HOLDING_SHARE * robot.effort_limit
+        held = (
+            np.abs(scene.inverse_dynamics(q, 0 * q, 0 * q)) <= HOLDING_FRACTION * robot.effort_limit
+        )
         if held.all():
             T = 3 * np.max(np.abs(q[1] - q[0]) / robot.velocity_limit)
             found.append((q[0], q[1], max(float(T), 1.0)))

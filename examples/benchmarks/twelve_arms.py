@@ -24,7 +24,7 @@ ARMS = {
     "alex_nub_hands": r"Left(?!Gripper).*",
 }
 """Robots of example-robot-data, with a pattern of the joints that move; all others are locked."""
-HOLDING_SHARE = 0.9
+HOLDING_FRACTION = 0.9
 """Largest torque that holds a start or goal, as a fraction of its limit."""
 
 
@@ -43,7 +43,7 @@ def reaches(scene: hovi.Scene, count: int, seed: int) -> list[tuple[np.ndarray, 
         start, goal = (_draw(robot, rng) for _ in range(2))
         slowness = rng.uniform(1.5, 3.0)
         torque = np.abs(_holding_torque(scene, np.array([start, goal])))
-        if (torque <= HOLDING_SHARE * robot.effort_limit).all():
+        if (torque <= HOLDING_FRACTION * robot.effort_limit).all():
             distance = np.abs(robot.difference(start, goal))
             T = slowness * np.max(distance / np.clip(robot.velocity_limit, 0.1, 10.0))
             found.append((start, goal, float(T)))

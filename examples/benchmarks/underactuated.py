@@ -128,7 +128,7 @@ def compare(scene: str) -> list[list[object]]:
         found, stats = solver(**arguments), solver.stats()
     solution = solve_on_grid(problem)
     residuals = ActionObjective(problem).residuals(solution.trajectory.path)
-    passive, tolerance = f"{residuals.torque_share:.0e}", f"{IPOPT['tol']:.0e}"
+    passive, tolerance = f"{residuals.torque_fraction:.0e}", f"{IPOPT['tol']:.0e}"
     steps, cost = stats["iter_count"], float(found["f"])
     word = "minimum" if stats["success"] else stats["return_status"]
     starts, spent, least = within(problem, theirs)

@@ -7,7 +7,7 @@ import numpy.typing as npt
 import pinocchio as pin
 import pytest
 
-from hovi.accuracy.guess_motion import MAX_DISTANCE, RESOLVED_SHARE, guess_curve
+from hovi.accuracy.guess_motion import MAX_DISTANCE, RESOLVED_FRACTION, guess_curve
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import Grid
 from hovi.discrete.guess import Curve, cubic, with_bump, with_turns
@@ -88,6 +88,6 @@ def test_the_near_guess_is_a_tenth_away_and_at_most_the_largest_distance(
 
     q, v, a = near(problem, motion)(TIMES)
     away = np.abs(q - motion(TIMES)[0]).max()
-    assert away == pytest.approx(min((1 - RESOLVED_SHARE) * size, MAX_DISTANCE), rel=1e-3)
+    assert away == pytest.approx(min((1 - RESOLVED_FRACTION) * size, MAX_DISTANCE), rel=1e-3)
     np.testing.assert_allclose(np.gradient(q, TIMES, axis=0)[2:-2], v[2:-2], atol=1e-3 * size)
     np.testing.assert_allclose(np.gradient(v, TIMES, axis=0)[2:-2], a[2:-2], atol=1e-2 * size)

@@ -105,4 +105,4 @@ def test_a_late_measurement_has_its_share_of_the_time_left(pendulum: Robot) -> N
     budget._began -= 0.85 * budget.seconds
     reference = ReferenceMotion(pendulum, 1.0, lambda t: np.zeros((len(t), 1)), 1.0)
     method, quiet = FakeMethod("late", 1e-9), lambda text, fraction: None
-    assert measure([method], reference, budget, quiet, share=0.9, repeats=0).runs
+    assert measure([method], reference, budget, quiet, fraction=0.9, repeats=0).runs

@@ -9,7 +9,7 @@ import pytest
 from hovi import PlanOptions, plan
 from hovi.accuracy.budget import Budget
 from hovi.accuracy.reference_search import Reference, find_reference
-from hovi.accuracy.resolved_motion import LIMIT_TOLERANCE_SHARE
+from hovi.accuracy.resolved_motion import LIMIT_TOLERANCE_FRACTION
 from hovi.discrete.grid import Grid
 from hovi.discrete.state import State
 from hovi.effects import Gravity
@@ -57,7 +57,7 @@ def test_a_motion_within_limits_is_the_minimum_within_limits(arm_scene: Scene) -
     tau = np.array(
         [pin.rnea(model, data, *jet) for jet in zip(sample.q, sample.v, sample.a, strict=True)]
     )
-    assert (np.abs(tau) <= most * (1 + 2.1 * LIMIT_TOLERANCE_SHARE * TOLERANCE)).all()
+    assert (np.abs(tau) <= most * (1 + 2.1 * LIMIT_TOLERANCE_FRACTION * TOLERANCE)).all()
     assert np.abs(tau).max(axis=0) == pytest.approx(most, rel=1e-3)
     assert weights @ (tau**2).sum(axis=1) / 2 == pytest.approx(resolved.cost, rel=1e-9)
     problem = found.problem.on(Grid.uniform(1.0, 256, hermite_simpson()))

@@ -10,7 +10,7 @@ from hovi.system.interruption import raise_if_interrupted
 
 
 class Budget(Deadline):
-    """A deadline with shares.
+    """A deadline of which parts of the work may take a fraction.
 
     seconds: its length, positive, in [s]. Raises InputError otherwise.
     """
@@ -26,14 +26,14 @@ class Budget(Deadline):
         """Fraction of the budget that is spent, at most 1."""
         return min(self.spent / self.seconds, 1.0)
 
-    def left_of(self, share: float) -> float:
+    def left_of(self, fraction: float) -> float:
         """Remaining time of a fraction of the budget, at least 0, in [s]."""
-        return max(share * self.seconds - self.spent, 0.0)
+        return max(fraction * self.seconds - self.spent, 0.0)
 
-    def allows(self, seconds: float, share: float = 1.0) -> bool:
-        """Whether work of this length, in [s], ends within `share` of the budget.
+    def allows(self, seconds: float, fraction: float = 1.0) -> bool:
+        """Whether work of this length, in [s], ends within `fraction` of the budget.
 
         Raises KeyboardInterrupt after an interrupt.
         """
         raise_if_interrupted()
-        return super().allows(seconds + (1.0 - share) * self.seconds)
+        return super().allows(seconds + (1.0 - fraction) * self.seconds)

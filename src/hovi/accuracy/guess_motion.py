@@ -14,25 +14,25 @@ from hovi.robot.robot import Robot
 Array = npt.NDArray[np.float64]
 
 GUESSES = ("near", "cubic")
-RESOLVED_SHARE = 0.9
+RESOLVED_FRACTION = 0.9
 """Fraction of the resolved motion in the near guess; the rest is the cubic."""
 MAX_DISTANCE = 0.3
 """Largest distance of the near guess from the resolved motion, in [rad] or [m]."""
 SAMPLES = 4001
 """Times at which the distance is measured, and turns are counted."""
-NEARER_RESOLVED_SHARE = 0.99
+NEARER_RESOLVED_FRACTION = 0.99
 """The same for methods that converge to other minima from the near guess."""
 
 
 def guess_curve(
-    name: str, problem: TrajectoryProblem, resolved: Trajectory, share: float = RESOLVED_SHARE
+    name: str, problem: TrajectoryProblem, resolved: Trajectory, fraction: float = RESOLVED_FRACTION
 ) -> Curve:
     """The guess as a curve: times -> q, v and a, and the jerk for order 3.
 
     name: "near" (nine tenths of the resolved motion and one tenth of the cubic between its ends, at
         most MAX_DISTANCE away, so that all methods converge to the same minimum) or "cubic", which
         is a quintic for order 3.
-    resolved: the motion to be found. share: its fraction in the near guess.
+    resolved: the motion to be found. fraction: how much of it is in the near guess.
     Raises InputError for an unknown name.
     """
     robot, T = problem.robot, problem.grid.duration
@@ -46,12 +46,12 @@ def guess_curve(
     turns = _Apart(robot, plain, motion, T).turns
     base = with_turns(plain, robot, T, turns) if turns.any() else plain
     apart = _Apart(robot, base, motion, T)
-    share = max(share, 1 - MAX_DISTANCE / max(apart.largest, MAX_DISTANCE))
+    fraction = max(fraction, 1 - MAX_DISTANCE / max(apart.largest, MAX_DISTANCE))
 
     def curve(t: Array) -> tuple[Array, ...]:
         (q, *rates), (_, *others) = base(t), motion(t)
-        moved = robot.integrate(q, share * apart(t))
-        return moved, *(x + share * (y - x) for x, y in zip(rates, others, strict=True))
+        moved = robot.integrate(q, fraction * apart(t))
+        return moved, *(x + fraction * (y - x) for x, y in zip(rates, others, strict=True))
 
     return curve
 

@@ -21,9 +21,9 @@ SUFFICIENT_ERRORS = Thresholds(cost=1e-12, joints=1e-8, tip=1e-8)
 """Errors below which finer grids only show rounding."""
 REPEATS = 7
 """Timed solves of a run after the first."""
-FIRST_SOLVES_SHARE = 0.8
+FIRST_SOLVES_FRACTION = 0.8
 """Fraction of the time left for first solves."""
-MAX_SOLVE_SHARE = 0.1
+MAX_SOLVE_FRACTION = 0.1
 """A method stops after a first solve longer than this fraction of the budget; a run is no longer
 repeated when its repeats have taken half of it."""
 DOMINANCE = 15.0
@@ -53,7 +53,7 @@ def measure(
     reference: ReferenceMotion,
     budget: Budget,
     progress: Progress,
-    share: float = 1.0,
+    fraction: float = 1.0,
     repeats: int = REPEATS,
     enough: Thresholds = SUFFICIENT_ERRORS,
 ) -> Measured:
@@ -62,10 +62,10 @@ def measure(
     The next grid is that of the method whose first solves took the least time so far. The repeats
     follow in rounds over all runs, so that other load on the machine affects all runs alike.
 
-    budget: of which `share` may be spent. repeats: of every valid run.
+    budget: of which `fraction` may be spent. repeats: of every valid run.
     enough: errors below which no finer grid is tried.
     """
-    last = budget.fraction + FIRST_SOLVES_SHARE * max(share - budget.fraction, 0.0)
+    last = budget.fraction + FIRST_SOLVES_FRACTION * max(fraction - budget.fraction, 0.0)
     refinements = [_Refinement(method) for method in methods]
     notes, complete, going = [], True, list(refinements)
     while going:
@@ -81,11 +81,11 @@ def measure(
             notes.append(f"{one.method.name}: {error}")
             going.remove(one)
             continue
-        slow = run.first_seconds > MAX_SOLVE_SHARE * budget.seconds
+        slow = run.first_seconds > MAX_SOLVE_FRACTION * budget.seconds
         if slow or one.finished or enough.met_by(run.error) or _dominated(run, refinements):
             going.remove(one)
     all_solved = [each.solved for each in refinements]
-    _repeat(all_solved, budget, progress, share, repeats)
+    _repeat(all_solved, budget, progress, fraction, repeats)
     runs = tuple(run for solved in all_solved for _, run in solved)
     return Measured(runs, complete, tuple(notes))
 
@@ -155,14 +155,14 @@ def _first_run(
 
 
 def _repeat(
-    all_solved: list[Solved], budget: Budget, progress: Progress, share: float, repeats: int
+    all_solved: list[Solved], budget: Budget, progress: Progress, fraction: float, repeats: int
 ) -> None:
     """Repeat all valid runs in rounds, as often as the budget allows."""
     for number in range(repeats):
         for solved in all_solved:
             for i, (prepared, run) in enumerate(solved):
-                enough = sum(run.repeats) > MAX_SOLVE_SHARE * budget.seconds / 2
-                if not run.counts or enough or not budget.allows(run.first_seconds, share):
+                enough = sum(run.repeats) > MAX_SOLVE_FRACTION * budget.seconds / 2
+                if not run.counts or enough or not budget.allows(run.first_seconds, fraction):
                     continue
                 progress(f"repeat {number + 1} of {repeats}, {run.method}", budget.fraction)
                 seconds = (*run.repeats, prepared.solve().seconds)

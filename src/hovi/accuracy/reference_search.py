@@ -30,9 +30,9 @@ from hovi.system.progress import Progress
 LIMITED_TOLERANCE = 1e-2
 """Relative tolerance of the cost of a motion within limits before it is resolved; without limits
 that of `plan`, as finer grids may find other motions."""
-SEARCH_SHARE = 0.5
+SEARCH_FRACTION = 0.5
 """Fraction of the budget for finding a motion; most scenes need a small part of it."""
-RESOLVE_SHARE = 0.2
+RESOLVE_FRACTION = 0.2
 """Fraction of the budget for refining the motion that was found."""
 STARTS = 4
 """Number of starts if the first guess leads to no motion that can be resolved."""
@@ -64,7 +64,7 @@ def find_reference(task: Task, budget: Budget, progress: Progress) -> Reference:
     """
     reasons: list[str] = []
     for words, attempt in ATTEMPTS.items():
-        if reasons and not budget.allows(0.0, SEARCH_SHARE):
+        if reasons and not budget.allows(0.0, SEARCH_FRACTION):
             break
         progress(f"planning {task.name}{', ' if reasons else ''}{words}", budget.fraction)
         try:
@@ -82,7 +82,7 @@ def find_reference(task: Task, budget: Budget, progress: Progress) -> Reference:
         return dataclasses.replace(reference, notes=(how, *reference.notes))
     tried = list(ATTEMPTS)[1 : len(reasons)]
     nor = f" Nor was one found {' or '.join(tried)}." if tried else ""
-    late = "" if budget.allows(0.0, SEARCH_SHARE) else " A larger budget allows a longer search."
+    late = "" if budget.allows(0.0, SEARCH_FRACTION) else " A larger budget allows a longer search."
     raise UnmeasurableError(
         f"no reference motion of {task.name} was found: {reasons[0]}{nor}{late}"
     )
@@ -107,7 +107,7 @@ def _resolved(found: Solution, budget: Budget, progress: Progress) -> Reference:
     if far_from_limits(found):
         notes.append(_inactive_note(found))
         problem = dataclasses.replace(problem, limits=None)
-    resolved = resolve(problem, found, budget, budget.fraction + RESOLVE_SHARE)
+    resolved = resolve(problem, found, budget, budget.fraction + RESOLVE_FRACTION)
     if problem.limited:
         notes.append(_limited_note(resolved))
     return Reference(problem.on(resolved.trajectory.grid), resolved, tuple(notes))
@@ -115,14 +115,14 @@ def _resolved(found: Solution, budget: Budget, progress: Progress) -> Reference:
 
 def _planned(task: Task, budget: Budget) -> Solution:
     """The motion as the task asks for it."""
-    return _plan(task, 0.5 * budget.left_of(SEARCH_SHARE))
+    return _plan(task, 0.5 * budget.left_of(SEARCH_FRACTION))
 
 
 def _from_more_starts(task: Task, budget: Budget) -> Solution:
     """The best of more starts, on a finer first grid: coarse ones do not resolve fast motions."""
     starts = max(STARTS, 2 * task.options.starts)
     intervals = max(MAX_FIRST_INTERVALS, task.options.interval_count)
-    left = 0.5 * budget.left_of(SEARCH_SHARE)
+    left = 0.5 * budget.left_of(SEARCH_FRACTION)
     # few starts take less time than starting processes
     return _plan(task, left, starts=starts, intervals=intervals, processes=1)
 
@@ -140,12 +140,12 @@ def _from_rotors(task: Task, budget: Budget) -> Solution:
     )
     guess: str | Trajectory = options.guess
     for stage in lighter_rotors(job):
-        left = budget.left_of(SEARCH_SHARE)
+        left = budget.left_of(SEARCH_FRACTION)
         solution = solve_on_grid(stage.job.problem(), guess, time_limit=left)
         if solution.status not in (Status.DIVERGED, Status.INFEASIBLE):
             guess = solution.trajectory
         raise_if_interrupted()
-    return _plan(task, budget.left_of(SEARCH_SHARE), guess=guess, intervals=None, starts=1)
+    return _plan(task, budget.left_of(SEARCH_FRACTION), guess=guess, intervals=None, starts=1)
 
 
 ATTEMPTS: dict[str, Attempt] = {
@@ -169,9 +169,9 @@ def _plan(task: Task, seconds: float, **changes: object) -> Solution:
 def _inactive_note(found: Solution) -> str:
     assert found.problem is not None
     assert found.problem.limits is not None
-    share = float(closeness(found.trajectory, found.problem.limits).min())
+    fraction = float(closeness(found.trajectory, found.problem.limits).min())
     return (
-        f"The motion stays {100 * share:.2g} % of the ranges or more away from its limits; the "
+        f"The motion stays {100 * fraction:.2g} % of the ranges or more away from its limits; the "
         "runs leave them out."
     )
 

@@ -30,10 +30,10 @@ LIMITED_MODES = 4
 MIN_INTERVALS, MAX_INTERVALS = 16, 1024
 CONVERGED = Thresholds(cost=1e-13, joints=1e-9, tip=1e-9)
 """Changes by a doubling of the intervals below which the motion is resolved."""
-CONVERGED_SHARE = 0.2
+CONVERGED_FRACTION = 0.2
 """Change of the cost within limits below which the motion is resolved, relative to the effect of
 the tolerance of the limits: below that, no run is any better."""
-LIMIT_TOLERANCE_SHARE = 0.01
+LIMIT_TOLERANCE_FRACTION = 0.01
 """Tolerance of the limits of the reference motion, relative to the scene's."""
 SLOW_DECREASE = 0.25
 """Ratio of successive changes below which the last one is an upper estimate of the error."""
@@ -98,19 +98,19 @@ class ResolvedMotion:
 
 
 def resolve(
-    problem: TrajectoryProblem, found: Solution, budget: Budget, share: float = 1.0
+    problem: TrajectoryProblem, found: Solution, budget: Budget, fraction: float = 1.0
 ) -> ResolvedMotion:
     """Refine a coarse solution to the minimum that it approximates.
 
     Without limits on uniform grids of `galerkin-8`, else on the solution's own grid, which is
     finer where limits become active; all intervals are halved again and again.
 
-    problem: on the grid of the solution; its limits hold to LIMIT_TOLERANCE_SHARE of their
-    tolerance. found: the coarse solution. budget: of which `share` may be spent.
+    problem: on the grid of the solution; its limits hold to LIMIT_TOLERANCE_FRACTION of their
+    tolerance. found: the coarse solution. budget: of which `fraction` may be spent.
     If there is no time for that, the coarse solution has its estimated error.
     Raises UnmeasurableError when no minimum can be resolved.
     """
-    solutions = _Halving(problem, found, budget, share)
+    solutions = _Halving(problem, found, budget, fraction)
     solutions.run()
     finest, change = solutions.finest, solutions.change
     if change is None and solutions.late:
@@ -142,9 +142,9 @@ class _Halving:
     """
 
     def __init__(
-        self, problem: TrajectoryProblem, found: Solution, budget: Budget, share: float
+        self, problem: TrajectoryProblem, found: Solution, budget: Budget, fraction: float
     ) -> None:
-        self._budget, self._share = budget, share
+        self._budget, self._fraction = budget, fraction
         self._problem = _with_strict_limits(problem) if problem.limited else problem
         cost = problem.ld.action(found.trajectory.path)  # without the cost of a free duration
         self.finest = dataclasses.replace(found, cost=cost)
@@ -154,9 +154,9 @@ class _Halving:
     def run(self) -> None:
         """Halve the intervals until the motion no longer changes, a solve fails or time is up."""
         grid, expected, failures = self._first_grid(), 0.0, 0
-        while grid.intervals <= MAX_INTERVALS and self._budget.allows(expected, self._share):
+        while grid.intervals <= MAX_INTERVALS and self._budget.allows(expected, self._fraction):
             began = time.monotonic()
-            left = self._budget.left_of(self._share)
+            left = self._budget.left_of(self._fraction)
             problem = on_grid(self._problem, grid)
             most = MAX_LIMITED_STEPS if problem.limited else MAX_STEPS
             solution = solve_on_grid(
@@ -177,13 +177,13 @@ class _Halving:
         """Whether the last change is small."""
         if self.change is None or not self._problem.limited:
             return self.change is not None and CONVERGED.met_by(self.change)
-        return self.change.cost <= CONVERGED_SHARE * self.limit_effect
+        return self.change.cost <= CONVERGED_FRACTION * self.limit_effect
 
     @property
     def limit_effect(self) -> float:
         """Relative effect of the limits' tolerance on the cost."""
         strict = self.change is not None
-        return cost_of_tolerance(self.finest) / (LIMIT_TOLERANCE_SHARE if strict else 1.0)
+        return cost_of_tolerance(self.finest) / (LIMIT_TOLERANCE_FRACTION if strict else 1.0)
 
     def _first_grid(self) -> Grid:
         grid = self.finest.trajectory.grid
@@ -220,7 +220,7 @@ def _first_intervals(grid: Grid) -> int:
 def _with_strict_limits(problem: TrajectoryProblem) -> TrajectoryProblem:
     """The problem with a smaller tolerance of its limits."""
     limits = problem.limits or no_limits(problem.robot)
-    strict = dataclasses.replace(limits, tolerance=LIMIT_TOLERANCE_SHARE * limits.tolerance)
+    strict = dataclasses.replace(limits, tolerance=LIMIT_TOLERANCE_FRACTION * limits.tolerance)
     return dataclasses.replace(problem, limits=strict)
 
 

@@ -8,10 +8,10 @@ from math import inf
 
 from hovi.accuracy.budget import Budget
 from hovi.accuracy.diagram import Diagram
-from hovi.accuracy.guess_motion import NEARER_RESOLVED_SHARE, guess_curve
+from hovi.accuracy.guess_motion import NEARER_RESOLVED_FRACTION, guess_curve
 from hovi.accuracy.measures import MEASURES, Thresholds, size
 from hovi.accuracy.measuring import (
-    MAX_SOLVE_SHARE,
+    MAX_SOLVE_FRACTION,
     REPEATS,
     SUFFICIENT_ERRORS,
     Measured,
@@ -36,11 +36,11 @@ from hovi.system.dataclass import dataclass
 from hovi.system.interruption import interruptible
 from hovi.system.progress import Progress, shows_progress, silent
 
-MEASURING_SHARE = 0.9
+MEASURING_FRACTION = 0.9
 """Fraction of the budget after which methods are no longer measured; the rest is for
 `plan(tolerance=)`."""
 
-LIMITED_SOLVE_SHARE = 0.5
+LIMITED_SOLVE_FRACTION = 0.5
 """Time limit of a solve within limits, relative to that of others: it may succeed on a finer grid,
 where fewer intervals have to be halved."""
 
@@ -110,8 +110,8 @@ def work_precision(
     reference = find_reference(task, time, report)
     problem, resolved = reference.problem, reference.resolved
     curve = guess_curve(guess, problem, resolved.trajectory)
-    nearer = guess_curve(guess, problem, resolved.trajectory, NEARER_RESOLVED_SHARE)
-    setting = Setting(problem, curve, nearer, MAX_SOLVE_SHARE * budget, clock)
+    nearer = guess_curve(guess, problem, resolved.trajectory, NEARER_RESOLVED_FRACTION)
+    setting = Setting(problem, curve, nearer, MAX_SOLVE_FRACTION * budget, clock)
     report("measuring plan's default", time.fraction)
     timer = ChoiceTimer(resolved.reference, time, repeats, clock)
     by_default = default_choice(task.options, problem, curve, timer)
@@ -123,7 +123,7 @@ def work_precision(
             resolved.reference,
             time,
             report,
-            MEASURING_SHARE,
+            MEASURING_FRACTION,
             repeats,
             _attainable(enough, resolved),
         )
@@ -163,7 +163,9 @@ def _methods(
     setting: Setting, schemes: Sequence[str], peers: Sequence[Peer]
 ) -> tuple[list[Method], list[str]]:
     """hovi's schemes and the reference tools that support the setting; why others do not."""
-    longest = LIMITED_SOLVE_SHARE * setting.longest if setting.problem.limited else setting.longest
+    longest = (
+        LIMITED_SOLVE_FRACTION * setting.longest if setting.problem.limited else setting.longest
+    )
     own = [partial(_own_method, name=name, longest=longest) for name in schemes]
     makers: list[Callable[[Setting], Method]] = [*own, *peers]
     methods: list[Method] = []

@@ -134,7 +134,7 @@ def in_chart(
 
 
 def with_bump(
-    base: Curve, coordinates: Coordinates, duration: float, seed: int, share: float = 1.0
+    base: Curve, coordinates: Coordinates, duration: float, seed: int, fraction: float = 1.0
 ) -> Curve:
     """A curve plus a smooth random bump that vanishes with its rate at both ends.
 
@@ -142,11 +142,11 @@ def with_bump(
     decreasing like 1/sqrt(j), and scaled by a random amplitude of up to about half a turn.
 
     base: the curve, up to the jerk on vector spaces. duration: T, in [s]. seed: of the
-        coefficients. share: of the bump that is added.
+        coefficients. fraction: of the bump that is added.
     """
     random = np.random.default_rng(seed)
     j = np.arange(1, BUMP_MODES + 1)
-    amplitude = share * random.uniform(*BUMP_AMPLITUDES)
+    amplitude = fraction * random.uniform(*BUMP_AMPLITUDES)
     c = amplitude * random.standard_normal((BUMP_MODES, coordinates.nv)) / np.sqrt(j)[:, None]
     w = np.pi / duration
 

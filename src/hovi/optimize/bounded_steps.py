@@ -32,9 +32,9 @@ LARGER_DENSITY, LEAST_DENSITY = 3.0, 1e-5
 """Mean density of the objective, relative to the present one, up to which the first one is the unit
 of the last barrier parameter, and the least unit, relative to the first one."""
 LONG_STEP = 0.95
-"""Shares of a direction above which it needs no correction."""
+"""Fractions of a direction above which it needs no correction."""
 SHORTER_FRACTIONS = 0.8, 0.6, 0.4, 0.2, 0.1, 0.03, 0.01, 1e-3
-"""Shares of the longest step that are tried: of a plain one as long as they predict more, so that
+"""Fractions of the longest step that are tried: of a plain one while they predict more, so that
 it ends away from the bounds; of a corrected one until one of them predicts a decrease."""
 
 FULL_REACTION_FRACTION = 0.1

@@ -15,7 +15,7 @@ from hovi.robot.space.joint_kinds import ANGLE, kind_of
 
 Array = npt.NDArray[np.float64]
 
-LIGHT_SHARE = 3e-3
+LIGHT_FRACTION = 3e-3
 """Largest inertia of a joint that is reported as light, relative to that of the heaviest."""
 
 
@@ -55,7 +55,7 @@ def check_mass_matrix(model: pin.Model) -> None:
 
 
 def joints_without_inertia(model: pin.Model) -> list[int]:
-    """The joints with the largest shares in the null space of M(q); none if M is regular.
+    """The joints with the largest components in the null space of M(q); none if M is regular.
 
     M is singular if lambda_min(M) <= 10 nv eps lambda_max(M) at one of four fixed random
     configurations. The neutral one is no criterion: a pendulum that hangs straight down has no
@@ -69,11 +69,11 @@ def joints_without_inertia(model: pin.Model) -> list[int]:
     if not free.any():
         return []
     first = int(np.argmax(free.any(axis=1)))
-    share = np.sum(vectors[first][:, free[first]] ** 2, axis=1)  # (nv,)
+    fraction = np.sum(vectors[first][:, free[first]] ** 2, axis=1)  # (nv,)
     return [
         index
         for index, joint in enumerate(model.joints[1:], start=1)
-        if share[joint.idx_v : joint.idx_v + joint.nv].max(initial=0.0) >= 0.5 * share.max()
+        if fraction[joint.idx_v : joint.idx_v + joint.nv].max(initial=0.0) >= 0.5 * fraction.max()
     ]
 
 
@@ -109,7 +109,7 @@ def little_inertia(model: pin.Model) -> dict[str, LightJoint]:
     """Turning joints of one coordinate that are far lighter than the heaviest, by name.
 
     Their inertia is the least M_jj at four fixed random configurations, armature included; light is
-    below LIGHT_SHARE of the largest M_jj.
+    below LIGHT_FRACTION of the largest M_jj.
     """
     joints = [
         (str(name), joint.idx_v)
@@ -122,7 +122,7 @@ def little_inertia(model: pin.Model) -> dict[str, LightJoint]:
     inertia = np.diagonal(MassMatrix(model)(samples), axis1=1, axis2=2)  # (samples, nv)
     least, most = inertia.min(axis=0), inertia[:, [i for _, i in joints]].max()
     return {
-        name: LightJoint(float(least[i]), float(LIGHT_SHARE * most - least[i]))
+        name: LightJoint(float(least[i]), float(LIGHT_FRACTION * most - least[i]))
         for name, i in joints
-        if least[i] < LIGHT_SHARE * most
+        if least[i] < LIGHT_FRACTION * most
     }

@@ -165,11 +165,11 @@ def _transfer_properties(model: pin.Model, coupling: Coupling) -> None:
     ends = coupling.leader, coupling.follower
     leader, follower = (model.joints[model.getJointId(name)] for name in ends)
     i, j, size = leader.idx_v, follower.idx_v, abs(coupling.multiplier)
-    shares = dict.fromkeys(("armature", "damping"), size**2)
-    shares |= dict.fromkeys(("lowerDryFrictionLimit", "upperDryFrictionLimit"), size)
-    for key, share in shares.items():
+    factors = dict.fromkeys(("armature", "damping"), size**2)
+    factors |= dict.fromkeys(("lowerDryFrictionLimit", "upperDryFrictionLimit"), size)
+    for key, factor in factors.items():
         values = getattr(model, key)
-        _set_entry(model, key, i, values[i] + share * values[j])
+        _set_entry(model, key, i, values[i] + factor * values[j])
     own, speed = model.upperVelocityLimit[i], model.upperVelocityLimit[j] / size
     if speed > 0.0 and (own == 0.0 or speed < own):
         _set_entry(model, "upperVelocityLimit", i, speed)

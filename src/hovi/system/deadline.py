@@ -51,10 +51,10 @@ class Deadline:
         """Whether work of this length, in [s], would end before the deadline."""
         return self._end is None or time.monotonic() + seconds <= self._end
 
-    def part(self, share: float) -> Deadline:
-        """A deadline after a share, in [0, 1], of the time left."""
+    def part(self, fraction: float) -> Deadline:
+        """A deadline after a fraction, in [0, 1], of the time left."""
         left = self.seconds_left
-        return Deadline(None if left is None else share * left)
+        return Deadline(None if left is None else fraction * left)
 
     @contextmanager
     def in_force(self) -> Iterator[None]:

@@ -30,9 +30,9 @@ from hovi.robot.tip_frame import is_moved
 
 Array = npt.NDArray[np.float64]
 
-FRICTION_SHARE = 0.01  # of the effort limit
-ROTOR_SHARE = 0.1  # of the joint's inertia
-LOAD_SHARE = 0.05  # of the mass, or of the weight
+FRICTION_FRACTION = 0.01  # of the effort limit
+ROTOR_FRACTION = 0.1  # of the joint's inertia
+LOAD_FRACTION = 0.05  # of the mass, or of the weight
 _EARTH = 9.81  # [m/s^2]
 
 
@@ -51,8 +51,8 @@ def effect_candidates(robot: Robot, passive: Sequence[str] = ()) -> tuple[Effect
         "armature": robot.armature.any(),
     }
     has_bearing = _has_bearing(robot)
-    friction = _rounded(FRICTION_SHARE * efforts * has_bearing)
-    rotors = _rounded(ROTOR_SHARE * _inertia(robot) * has_bearing)
+    friction = _rounded(FRICTION_FRACTION * efforts * has_bearing)
+    rotors = _rounded(ROTOR_FRACTION * _inertia(robot) * has_bearing)
     candidates: list[Effect] = [
         Gravity(),
         ViscousFriction(from_urdf=True) if in_model["damping"] else ViscousFriction(friction),
@@ -61,7 +61,7 @@ def effect_candidates(robot: Robot, passive: Sequence[str] = ()) -> tuple[Effect
         MovingBase((0.0, 0.0, "0.01*sin(4*pi*t)")),
     ]
     if is_moved(robot.model, tip):
-        (load,), (push,) = _rounded(LOAD_SHARE * mass), _rounded(LOAD_SHARE * mass * _EARTH)
+        (load,), (push,) = _rounded(LOAD_FRACTION * mass), _rounded(LOAD_FRACTION * mass * _EARTH)
         candidates += [
             Payload(tip, load),
             Wrench(tip, (0.0, push, 0.0)),

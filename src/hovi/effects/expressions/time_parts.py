@@ -13,7 +13,7 @@ from hovi.system.dataclass import dataclass
 
 CHANGE = 2.0
 """Largest change of the argument of a function of time in an interval, as in exp(x) or sin(x)."""
-LEAST_SHARE = 2.0**-20
+LEAST_FRACTION = 2.0**-20
 """Shortest part of a motion that is looked at, relative to its duration."""
 SMALL_PART = 1e-5
 """What a function may deviate from a line within a part of time, integrated, relative to the
@@ -86,7 +86,7 @@ def bisected(parts: Sequence[TimePart], nodes: Array) -> Bisection:
     nodes: ends of the intervals, ascending, in [s].
     """
     peaks = [np.zeros(part.value.size) for part in parts]
-    least, known = LEAST_SHARE * float(nodes[-1] - nodes[0]), len(nodes)
+    least, known = LEAST_FRACTION * float(nodes[-1] - nodes[0]), len(nodes)
     while True:
         wrong = np.array([_unresolved(*each, nodes) for each in zip(parts, peaks, strict=True)])
         cut = wrong.any(axis=0)

@@ -26,7 +26,7 @@ Values = TypeVar("Values", bound=Equal | Between, covariant=True)
 Place = TypeVar("Place", bound=Where, covariant=True)
 
 TOLERANCE = 1e-6
-"""Share of its scale by which a bound may be exceeded."""
+"""Fraction of its scale by which a bound may be exceeded."""
 EVERYWHERE: Any = AtPoints()
 
 

@@ -126,8 +126,8 @@ class ObstaclePath:
         a, b, c, q = np.asarray(self._spline.c)
         points = np.stack([c, c + b * h, c + 2.0 * b * h + 3.0 * a * h**2])
         speeds = [np.linalg.norm(x, axis=2).max(axis=0) for x in (points[..., :3], points[..., 3:])]
-        shares = np.linspace(0.0, 1.0, 9)[:, None, None]
-        along = q + shares * h * (c + shares * h * (b + shares * h * a))
+        fractions = np.linspace(0.0, 1.0, 9)[:, None, None]
+        along = q + fractions * h * (c + fractions * h * (b + fractions * h * a))
         length = np.linalg.norm(along[..., 3:], axis=2).min(axis=0)
         turns = np.where(speeds[1] == 0, 0.0, 2.0 * speeds[1] / np.maximum(length, LEAST_COSINE))
         return np.column_stack([speeds[0], turns]) * h

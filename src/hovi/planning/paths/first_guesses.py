@@ -19,8 +19,8 @@ MAX_PATHS = 8
 FURTHER = 4
 """Number of paths that are drawn where neither the first one nor the direct guess leads to a
 motion."""
-PATH_SHARE = 0.2
-"""Share of the time limit for finding paths."""
+PATH_FRACTION = 0.2
+"""Fraction of the time limit for finding paths."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +100,7 @@ def _drawn(
     """So many paths, or those that are found in their fraction of the time that is left."""
     paths = list[DiscretePath]()
     try:
-        with deadline.part(PATH_SHARE).in_force():
+        with deadline.part(PATH_FRACTION).in_force():
             for path in path_guesses(problem, direct, count, seed):
                 paths.append(path)
     except OutOfTimeError:

@@ -96,8 +96,8 @@ class FreeSpace:
     def is_free_between(self, x: Array, y: Array) -> bool:
         """Whether the margin is kept on the straight way between two points."""
         parts = int(np.ceil(np.max(np.abs(y - x) * self.speed / self._steps)))
-        shares = np.linspace(0.0, 1.0, parts + 1)[:, None]
-        return self.depth(self.q(x + shares * (y - x))) <= ROUNDING
+        fractions = np.linspace(0.0, 1.0, parts + 1)[:, None]
+        return self.depth(self.q(x + fractions * (y - x))) <= ROUNDING
 
     def depth(self, q: Array) -> float:
         """By how much configurations (M, nq) miss the margin at most, in [m]."""

@@ -120,8 +120,10 @@ def action_metric(
         metric[index, :own, :own] = scale[:, None, None] * ((rows.T * scheme.weights) @ rows)
         if periodic:
             rows = (scheme.nodal_table if coordinates == "nodal" else scheme.regular_table)[:, 0]
-            share = grid.steps[index] / grid.duration
-            metric[index, :own, :own] += share[:, None, None] * ((rows.T * scheme.weights) @ rows)
+            fraction = grid.steps[index] / grid.duration
+            metric[index, :own, :own] += fraction[:, None, None] * (
+                (rows.T * scheme.weights) @ rows
+            )
     return metric
 
 

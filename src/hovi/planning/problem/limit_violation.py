@@ -30,14 +30,14 @@ REFINED_SAMPLES = 25
 """Samples of each further pass, between the neighbours of an extreme sample."""
 BATCH = 128
 """Extremes that are refined at once."""
-REFINEMENT_SHARE = 0.05
+REFINEMENT_FRACTION = 0.05
 """The largest extreme of an output in an interval is refined if it is closer than this to a bound,
 as a fraction of its range."""
 COARSE_MODES = 4
 COARSE = 4, 2
 """Stride of the samples that `excess_of` looks at first: on grids of at most COARSE_MODES inner
 modes, and on others."""
-PEAK_SHARE = 2e-3
+PEAK_FRACTION = 2e-3
 """The same for every other local extreme; smaller, as a motion along a bound has many of them."""
 AT_LIMIT = 1e-3
 """Distance to a bound, as a fraction of its range, within which an output is at the bound."""
@@ -147,7 +147,7 @@ def excess_of(
     change = np.abs(np.diff(y, axis=1)).max(axis=1)
     below, above = (each[:, kinds, joints] for each in limits.on(trajectory.t))
     sides = np.stack([below - y.min(axis=1), y.max(axis=1) - above]) / ranges
-    safe = sides + change / ranges <= -REFINEMENT_SHARE  # false where it is no number
+    safe = sides + change / ranges <= -REFINEMENT_FRACTION  # false where it is no number
     found[:, :, kinds, joints] = sides
     near = np.flatnonzero(~safe.all(axis=(0, 2)))
     if len(near) > 0:
@@ -292,8 +292,8 @@ def _near_extremes(excess: Array, largest: Array) -> npt.NDArray[np.bool_]:
     padded = np.pad(excess, ((0, 0), (1, 1), (0, 0)), constant_values=-np.inf)
     with np.errstate(invalid="ignore"):
         peak = (excess >= padded[:, :-2]) & (excess >= padded[:, 2:])
-    highest = (excess == largest[:, None]) & (excess > -REFINEMENT_SHARE)
-    return np.asarray(peak & np.isfinite(excess) & (highest | (excess > -PEAK_SHARE)))
+    highest = (excess == largest[:, None]) & (excess > -REFINEMENT_FRACTION)
+    return np.asarray(peak & np.isfinite(excess) & (highest | (excess > -PEAK_FRACTION)))
 
 
 def _may_exceed(excess: Array, tolerance: float) -> npt.NDArray[np.bool_]:

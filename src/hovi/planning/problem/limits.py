@@ -41,9 +41,9 @@ UNBOUNDED = 1e15
 MIN_RANGE = 1e-12
 """Minimum range upper - lower, relative to the bounds where they are larger than one."""
 TOLERANCE = 1e-6
-"""Share of its range by which a limit may be exceeded between the quadrature points."""
+"""Fraction of its range by which a limit may be exceeded between the quadrature points."""
 WINDOW = 0.05
-"""Share of a motion in which a start outside its limits is led back, if it can be so slowly."""
+"""Fraction of a motion in which a start outside its limits is led back, if it can be so slowly."""
 
 
 @check_arguments

@@ -15,7 +15,7 @@ from hovi.checks.arguments import check_arguments_except
 from hovi.checks.kinds import is_number, shown
 from hovi.discrete.measures.motion_error import MotionError
 from hovi.errors import InputError, nearest
-from hovi.planning.problem.units import ANGLES, LENGTHS, SHARES, number_and_unit
+from hovi.planning.problem.units import ANGLES, FRACTIONS, LENGTHS, number_and_unit
 from hovi.robot.robot import Robot
 from hovi.robot.tip_frame import names_in_words
 from hovi.system.dataclass import dataclass
@@ -27,11 +27,11 @@ one of the cost, asks to improve."""
 LAST_BARRIER = 1e-8
 """Last barrier parameter within limits where nothing else is asked for, relative to the mean
 density of the cost, which exceeds its minimum by some ten times as much."""
-BARRIER_SHARE, LARGEST_BARRIER = 3e-3, 3e-6
+BARRIER_FRACTION, LARGEST_BARRIER = 3e-3, 3e-6
 """The same for a tolerance of the cost, as a fraction of it, and at most."""
-FINER_SHARES = 1 / 30, 1e-3, 1e-5
+FINER_FRACTIONS = 1 / 30, 1e-3, 1e-5
 """Fractions of a tolerance that are tried if a minimum satisfies it and is still not resolved."""
-REMAINING_SHARE = 0.5
+REMAINING_FRACTION = 0.5
 """Predicted relative decrease of the last step within limits, as a fraction of the last barrier."""
 
 
@@ -51,7 +51,7 @@ class Tolerance:
     size: relative for the cost, in [rad] for the joints ([m] for sliding ones), in [m] for a
         frame.
     quantity: which of the three. frame: name of the frame; all of the robot's tip_frames if None.
-    unit: used in messages: of LENGTHS, ANGLES or SHARES; "" stands for mm, rad or 1.
+    unit: used in messages: of LENGTHS, ANGLES or FRACTIONS; "" stands for mm, rad or 1.
     tips: the robot's tip_frames, used in messages.
     """
 
@@ -87,12 +87,12 @@ class Tolerance:
         """The last barrier parameter of solves within limits, relative to the mean density."""
         if self.quantity is not Quantity.COST:
             return LAST_BARRIER
-        return min(max(LAST_BARRIER, BARRIER_SHARE * self.size), LARGEST_BARRIER)
+        return min(max(LAST_BARRIER, BARRIER_FRACTION * self.size), LARGEST_BARRIER)
 
     @property
     def finer(self) -> tuple[Tolerance, ...]:
         """Smaller tolerances of the same quantity, the largest first."""
-        return tuple(replace(self, size=share * self.size) for share in FINER_SHARES)
+        return tuple(replace(self, size=fraction * self.size) for fraction in FINER_FRACTIONS)
 
     @classmethod
     def _parsed(cls, text: str) -> Self:
@@ -110,9 +110,9 @@ class Tolerance:
             )
         if unit in ANGLES:
             return cls(size * ANGLES[unit], Quantity.JOINTS, unit=unit)
-        if unit in SHARES:
-            return cls(size * SHARES[unit], unit=unit)
-        units = [unit for unit in (*LENGTHS, *ANGLES, *SHARES) if unit]
+        if unit in FRACTIONS:
+            return cls(size * FRACTIONS[unit], unit=unit)
+        units = [unit for unit in (*LENGTHS, *ANGLES, *FRACTIONS) if unit]
         raise InputError(f"tolerance {text!r} has the unit {unit!r}: {nearest(unit, units)}")
 
     def _checked(self, robot: Robot) -> Self:
@@ -142,7 +142,7 @@ class Tolerance:
         at: its frame; "" names all frames measured. cost: what relative errors are relative to.
         """
         if self.quantity is Quantity.COST:
-            number = f"{size / SHARES[self.unit]:.2g}"
+            number = f"{size / FRACTIONS[self.unit]:.2g}"
             return f"{number} {self.unit} of {cost}".replace("  ", " ")
         if self.quantity is Quantity.JOINTS:
             unit = self.unit or "rad"

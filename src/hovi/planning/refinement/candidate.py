@@ -22,7 +22,7 @@ from hovi.planning.refinement.faults.along_motion import may_be_narrow
 from hovi.planning.refinement.limit_sensitivity import cost_of_tolerance
 from hovi.planning.refinement.nodal_hamiltonian import nodal_hamiltonian
 from hovi.planning.refinement.passive_torque import (
-    NEGLIGIBLE_SHARE,
+    NEGLIGIBLE_FRACTION,
     PassiveTorque,
     passive_torque,
 )
@@ -36,11 +36,11 @@ from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 
-ACCEPTED_SHARE = 0.8
+ACCEPTED_FRACTION = 0.8
 """Largest accepted estimate, as a fraction of the tolerance."""
 CANCELLATION_LIMIT = 20.0
 """Largest accepted sum of the intervals' |contributions| to the cost's error, in tolerances."""
-HAMILTONIAN_ERROR_SHARE = 0.1
+HAMILTONIAN_ERROR_FRACTION = 0.1
 """Relative error of the cost that is inferred from the nodal Hamiltonian, over its spread."""
 ROUNDING_FLOOR = 1e-14
 """Smallest estimate of the relative error of the cost."""
@@ -117,7 +117,7 @@ class Candidate:
     @property
     def is_carried(self) -> bool:
         """Whether the integral along the curve is accurate, and passive torques are negligible."""
-        return self.along <= self._largest_along and self.passive_share <= NEGLIGIBLE_SHARE
+        return self.along <= self._largest_along and self.passive_fraction <= NEGLIGIBLE_FRACTION
 
     @property
     def is_trusted(self) -> bool:
@@ -132,9 +132,9 @@ class Candidate:
         return cost and bool(known <= 2 * least_error(self.solution))
 
     @property
-    def passive_share(self) -> float:
+    def passive_fraction(self) -> float:
         """Largest relative torque of a passive joint along the motion."""
-        return 0.0 if self.passive is None else self.passive.share
+        return 0.0 if self.passive is None else self.passive.fraction
 
     @property
     def difference(self) -> float:
@@ -241,7 +241,7 @@ def _errors_of_cost(
 
 
 def _accepted(error: float, uncancelled: float, tolerance: Tolerance) -> bool:
-    return error <= ACCEPTED_SHARE * tolerance.size and _trusted(uncancelled, tolerance)
+    return error <= ACCEPTED_FRACTION * tolerance.size and _trusted(uncancelled, tolerance)
 
 
 def _trusted(uncancelled: float, tolerance: Tolerance) -> bool:
@@ -314,4 +314,4 @@ def _hamiltonian_error(solution: Solution) -> float:
         spread = nodal_hamiltonian(solution.problem, solution.trajectory).spread
     except InputError:
         return 0.0
-    return HAMILTONIAN_ERROR_SHARE * spread
+    return HAMILTONIAN_ERROR_FRACTION * spread

@@ -312,8 +312,8 @@ def _cost_of_difference(
     if weights.any():
         return np.asarray(np.vecdot(by_joint, weights))
     gains = coarse.grid.steps * a.sum(axis=1)
-    shares = gains / max(float(gains.sum()), np.finfo(float).tiny)
-    return np.asarray(difference * shares)
+    fractions = gains / max(float(gains.sum()), np.finfo(float).tiny)
+    return np.asarray(difference * fractions)
 
 
 def prolonged(path: DiscretePath, fine: Grid) -> DiscretePath:

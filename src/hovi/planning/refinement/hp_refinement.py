@@ -144,17 +144,17 @@ def _pieces(current: Index, more: Index, rho: Array, demands: Sequence[Demand], 
     return pieces
 
 
-def _cheapest(more: Index, pieces: Index, share: float, k: int) -> tuple[int, int]:
+def _cheapest(more: Index, pieces: Index, fraction: float, k: int) -> tuple[int, int]:
     """Indices in MODES of the cheapest pair of numbers of modes, which may be equal.
 
-    share: fixed costs for this number of joints, relative to those for one joint.
+    fraction: fixed costs for this number of joints, relative to those for one joint.
     """
     low, high = np.triu_indices(more.shape[1])
     points = pieces * (more + k)
     count = np.where(points[:, low] <= points[:, high], pieces[:, low], pieces[:, high])
     work = np.minimum(points[:, low], points[:, high]).sum(axis=0)
     work = work + HESSIAN_COST * count.sum(axis=0) * (more.max(axis=0)[high] + 2 * k) ** 2
-    work += share * (SCHEME_COST * (low != high) + SPLIT_COST * (count > 1).any(axis=0))
+    work += fraction * (SCHEME_COST * (low != high) + SPLIT_COST * (count > 1).any(axis=0))
     best = int(np.argmin(work))
     return int(low[best]), int(high[best])
 

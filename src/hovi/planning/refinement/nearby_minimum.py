@@ -24,7 +24,7 @@ MAX_CORRECTIONS = 2
 """Maximum number of further steps with one Hessian."""
 MAX_CONTRACTION = 0.3
 """Ratio of the lengths of successive steps above which a new Hessian is computed."""
-LAST_STEP_SHARE = 0.02
+LAST_STEP_FRACTION = 0.02
 """Length of the last step of an approach, relative to the longest distance covered."""
 ROUNDING_LENGTH = 1e-15
 """Length of a step, relative to the data, that is due to rounding."""
@@ -120,8 +120,8 @@ def nearby_minimum(
             x, steps, distance = objective.retract(x, step, model), steps + 1, distance + length
             longest, total = max(longest, length), total + step
             decrease = -0.5 * float(np.vdot(gradient, step))
-            near = length <= max(LAST_STEP_SHARE * longest, ROUNDING_LENGTH)
-            if near and (known is None or decrease <= LAST_STEP_SHARE * abs(value - known)):
+            near = length <= max(LAST_STEP_FRACTION * longest, ROUNDING_LENGTH)
+            if near and (known is None or decrease <= LAST_STEP_FRACTION * abs(value - known)):
                 return NearbyMinimum(
                     objective, x, value - decrease, model, factor, distance, length, steps, began
                 )

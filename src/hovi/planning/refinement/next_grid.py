@@ -12,11 +12,11 @@ from hovi.planning.problem.tolerance import CURVE_TOLERANCE, Quantity
 from hovi.planning.refinement.candidate import Candidate, contributions
 from hovi.planning.refinement.error_estimate import FinerSolution, estimate_against
 from hovi.planning.refinement.hp_refinement import UNRESOLVED_MODES, Demand, decay, refined
-from hovi.planning.refinement.passive_torque import NEGLIGIBLE_SHARE
+from hovi.planning.refinement.passive_torque import NEGLIGIBLE_FRACTION
 
 Array = npt.NDArray[np.float64]
 
-TARGET_SHARE = 0.3
+TARGET_FRACTION = 0.3
 """Error for which a grid is refined, as a fraction of the tolerance."""
 MAX_ERROR_OF_DECAY = 1e-2
 """Relative error of the cost up to which the decay of the modes is that of the motion."""
@@ -71,7 +71,7 @@ def interpolated_to(finer: FinerSolution, problem: TrajectoryProblem) -> Discret
 def _demands(candidate: Candidate, finer: FinerSolution) -> list[Demand]:
     """The reduction of the error that each interval needs."""
     known = contributions(finer)
-    N, target = len(known), TARGET_SHARE * candidate.tolerance.size
+    N, target = len(known), TARGET_FRACTION * candidate.tolerance.size
     if candidate.tolerance.quantity is Quantity.COST:
         error = candidate.error
         if error <= target:  # then only the integral along the curve is not accurate enough
@@ -85,7 +85,7 @@ def _passive_demands(candidate: Candidate) -> list[Demand]:
     """The reduction of passive torques that each interval needs."""
     if candidate.passive is None:
         return []
-    target = TARGET_SHARE * NEGLIGIBLE_SHARE
+    target = TARGET_FRACTION * NEGLIGIBLE_FRACTION
     return [Demand(target / np.maximum(candidate.passive.by_interval, 1e-300), 1)]
 
 
@@ -97,14 +97,14 @@ def _demands_on_curve(candidate: Candidate, finer: FinerSolution, known: Array) 
         along, ends = estimate.tip, estimate.tip_at_nodes
     else:
         along, ends = estimate.q.max(axis=1), estimate.q_at_nodes.max(axis=1)
-    target = TARGET_SHARE * tolerance.size
+    target = TARGET_FRACTION * tolerance.size
     nearby = np.maximum(ends[:-1], ends[1:])
     own = np.where(along > 3 * nearby, along, 0.0)
     nodes = target / max(float(ends.max()), 1e-300)
-    share = known * len(known) / max(known.sum(), 1e-300)
+    relative = known * len(known) / max(known.sum(), 1e-300)
     return [
         Demand(target / np.maximum(own, 1e-300), 1),
-        Demand(nodes / np.maximum(share, 1e-300), 2),
+        Demand(nodes / np.maximum(relative, 1e-300), 2),
     ]
 
 

@@ -13,7 +13,7 @@ from hovi.planning.problem.problem import TrajectoryProblem
 
 Array = npt.NDArray[np.float64]
 
-NEGLIGIBLE_SHARE = 0.01
+NEGLIGIBLE_FRACTION = 0.01
 """Largest torque of a passive joint along a motion, relative to that of the other joints."""
 
 LEAST_TORQUE = 1e-9
@@ -36,7 +36,7 @@ class PassiveTorque(NamedTuple):
     largest: float
 
     @property
-    def share(self) -> float:
+    def fraction(self) -> float:
         """The largest of by_interval."""
         return float(self.by_interval.max())
 

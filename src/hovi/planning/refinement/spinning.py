@@ -28,7 +28,7 @@ MAX_GRIDS = 6
 """Maximum number of grids that are tried for a spinning motion."""
 MAX_GRIDS_ALONE = 3
 """The same for grids in a row with no solution near theirs on a finer grid."""
-MAX_INERTIA_SHARE = 0.03
+MAX_INERTIA_FRACTION = 0.03
 """Largest inertia of a joint that counts as spinning, relative to that of the heaviest: the torque
 that spins a heavier one shows in the cost. `hovi info` warns of far lighter ones only."""
 MAX_WORK = 20_000
@@ -123,7 +123,7 @@ def spin(solution: Solution) -> Spin | None:
         return None
     diagonal = np.diagonal(MassMatrix(problem.scene.model)(q), axis1=1, axis2=2)
     inertia = float(diagonal[:, worst].min())
-    if inertia > MAX_INERTIA_SHARE * diagonal[:, joints].max():
+    if inertia > MAX_INERTIA_FRACTION * diagonal[:, joints].max():
         return None
     name, speed = trajectory.coordinate_names[worst], float(v[:, worst].max())
     return Spin(name, speed, float(ratio[worst]), inertia)

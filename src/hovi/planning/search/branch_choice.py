@@ -62,8 +62,8 @@ LAST_BARRIER = 1e-2
 """Last barrier parameter of these motions, relative to the mean density of their cost."""
 STEPS = 40
 """Largest number of steps towards each of them."""
-SHARE = 0.2
-"""Share of a time limit for the choice."""
+CHOICE_FRACTION = 0.2
+"""Fraction of a time limit for the choice."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +104,7 @@ class Ends:
         """
         if self.choice is None:
             return None
-        choice = dataclasses.replace(self.choice, deadline=deadline.part(SHARE))
+        choice = dataclasses.replace(self.choice, deadline=deadline.part(CHOICE_FRACTION))
         known = [each for each in self._from_start if each.known]
         best = choice.clear(known, cost) if known else None
         return None if best is None else choice.chosen((best,))
@@ -126,7 +126,7 @@ def chosen_ends(
     """
     if isinstance(start, State) and _is_one(goal):
         return Ends(start, goal)
-    return _Choice(scene, start, goal, duration, options, deadline.part(SHARE)).ends()
+    return _Choice(scene, start, goal, duration, options, deadline.part(CHOICE_FRACTION)).ends()
 
 
 def nearest_ends(

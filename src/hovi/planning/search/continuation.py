@@ -116,7 +116,7 @@ def _order(job: Job, failed: Solution) -> list[str]:
 class _Continuation:
     """State shared by all continuations, and the progress of the current one.
 
-    stages, steps: of the current continuation. shares: its range of the overall progress.
+    stages, steps: of the current continuation. fractions: its range of the overall progress.
     ended: status that ended it, if any.
     """
 
@@ -127,12 +127,12 @@ class _Continuation:
     name: str = field(default="", init=False)
     steps: int = field(default=0, init=False)
     stages: int = field(default=0, init=False)
-    shares: tuple[float, float] = field(default=(0.0, 1.0), init=False)
+    fractions: tuple[float, float] = field(default=(0.0, 1.0), init=False)
     ended: Status | None = field(default=None, init=False)
 
     def begin(self, name: str, first: float, last: float) -> None:
         """Start a continuation that covers progress from `first` to `last`."""
-        self.name, self.steps, self.stages, self.shares = name, 0, 0, (first, last)
+        self.name, self.steps, self.stages, self.fractions = name, 0, 0, (first, last)
 
     @property
     def summary(self) -> str:
@@ -164,12 +164,12 @@ class _Continuation:
             best = best if found is None else found
         return found
 
-    def _solve(self, stage: Stage, guess: str | Trajectory, share: float) -> Solution | None:
+    def _solve(self, stage: Stage, guess: str | Trajectory, fraction: float) -> Solution | None:
         """Solve one stage; None if its problem is invalid."""
         if self.progress is not None:
-            first, last = self.shares
+            first, last = self.fractions
             text = f"continuation in {self.name}: {stage.name}"
-            self.progress(text, first + share * (last - first))
+            self.progress(text, first + fraction * (last - first))
         left = self.deadline.seconds_left
         try:
             problem, most = stage.job.problem(), self.job.options.max_iterations

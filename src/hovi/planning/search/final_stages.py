@@ -273,5 +273,5 @@ def on_grid_of(problem: TrajectoryProblem, solution: Solution) -> TrajectoryProb
 
 
 def _window(problem: TrajectoryProblem) -> float:
-    """Share of the motion in which a start outside its limits is led back; 0 without limits."""
+    """Fraction of the motion in which a start outside its limits is led back; 0 without limits."""
     return 0.0 if problem.limits is None else problem.limits.window

@@ -183,9 +183,9 @@ class _Trial:
         """Whether J + w T decreases from here towards the duration of another trial."""
         return self.slope * (other.duration - self.duration) < 0
 
-    def steeper_than(self, share: float) -> bool:
+    def steeper_than(self, fraction: float) -> bool:
         """Whether |J' + w| exceeds a fraction of (J + w T) / T."""
-        return abs(self.slope) > share * abs(self.total) / self.duration
+        return abs(self.slope) > fraction * abs(self.total) / self.duration
 
     def gap_to(self, other: _Trial) -> float:
         """Relative difference of the durations."""

@@ -36,7 +36,7 @@ ROTOR_REDUCTION = 10.0
 """Factor by which the rotor inertia is reduced from stage to stage."""
 LAST_ROTOR_RATIO = 0.1
 """Smallest rotor inertia, relative to the smallest eigenvalue of the mass matrix."""
-GRAVITY_SHARES = 0.0, 0.25, 0.5, 0.75
+GRAVITY_FRACTIONS = 0.0, 0.25, 0.5, 0.75
 """Gravity of the stages, relative to the job's."""
 SHORTER_DURATIONS = 0.125, 0.25, 0.5
 LONGER_DURATIONS = 2.0, 1.5, 1.25, 1.1
@@ -89,10 +89,10 @@ def growing_gravity(job: Job) -> list[Stage]:
         return []
     return [
         Stage(
-            f"{100 * share:.0f} % of gravity",
-            dataclasses.replace(job, scene=_with_effect(job.scene, WeakerGravity(share))),
+            f"{100 * fraction:.0f} % of gravity",
+            dataclasses.replace(job, scene=_with_effect(job.scene, WeakerGravity(fraction))),
         )
-        for share in GRAVITY_SHARES
+        for fraction in GRAVITY_FRACTIONS
     ]
 
 
@@ -100,8 +100,8 @@ def other_durations(job: Job) -> list[Stage]:
     """Durations from shorter ones, or from longer ones with limits; velocities in proportion."""
     limited = bool(job.limits.bounded.any())
     return [
-        Stage(f"a duration of {share * job.grid.duration:.4g} s", _with_duration(job, share))
-        for share in (LONGER_DURATIONS if limited else SHORTER_DURATIONS)
+        Stage(f"a duration of {factor * job.grid.duration:.4g} s", _with_duration(job, factor))
+        for factor in (LONGER_DURATIONS if limited else SHORTER_DURATIONS)
     ]
 
 
@@ -127,10 +127,10 @@ def narrowing_limits(job: Job) -> list[Stage]:
         return []
     return [
         Stage(
-            f"limits {share:g} times as wide",
-            job.with_options(limits=_widened(job.limits, share)),
+            f"limits {factor:g} times as wide",
+            job.with_options(limits=_widened(job.limits, factor)),
         )
-        for share in RANGE_RATIOS
+        for factor in RANGE_RATIOS
     ]
 
 
@@ -142,33 +142,33 @@ def _without_torque_limits(job: Job) -> Job:
     return job.with_options(limits=job.limits.without("tau"))
 
 
-def _widened(limits: Limits, share: float) -> Limits:
-    """Limits whose ranges are `share` times as wide, with the same centers."""
+def _widened(limits: Limits, factor: float) -> Limits:
+    """Limits whose ranges are `factor` times as wide, with the same centers."""
     if limits.parts:
-        return Limits.of_segments([_widened(p, share) for p in limits.parts], limits.ends)
-    more = (share - 1) / 2 * limits.ranges
+        return Limits.of_segments([_widened(p, factor) for p in limits.parts], limits.ends)
+    more = (factor - 1) / 2 * limits.ranges
     return dataclasses.replace(limits, lower=limits.lower - more, upper=limits.upper + more)
 
 
-def _with_duration(job: Job, share: float) -> Job:
-    """The job with its duration times `share`, and velocities of its ends in proportion."""
-    grid = Grid(share * job.grid.steps, job.grid.schemes)
+def _with_duration(job: Job, factor: float) -> Job:
+    """The job with its duration times `factor`, and velocities of its ends in proportion."""
+    grid = Grid(factor * job.grid.steps, job.grid.schemes)
     via = tuple(
-        dataclasses.replace(each, time=share * each.time, goal=_rescaled(each.goal, share))
+        dataclasses.replace(each, time=factor * each.time, goal=_rescaled(each.goal, factor))
         for each in job.via
     )
-    start, goal, limits = _rescaled(job.start, share), _rescaled(job.goal, share), job.limits
+    start, goal, limits = _rescaled(job.start, factor), _rescaled(job.goal, factor), job.limits
     if limits.parts:
-        ends = [share * end for end in limits.ends]
+        ends = [factor * end for end in limits.ends]
         job = job.with_options(limits=Limits.of_segments(limits.parts, ends))
     return dataclasses.replace(job.with_options(via=via), grid=grid, start=start, goal=goal)
 
 
-def _rescaled(state: Goal, share: float) -> Goal:
-    """A state with its velocity divided by `share`; task-space goals are unchanged."""
+def _rescaled(state: Goal, factor: float) -> Goal:
+    """A state with its velocity divided by `factor`; task-space goals are unchanged."""
     if isinstance(state, FrameGoal) or state.v is None:
         return state
-    return dataclasses.replace(state, v=np.asarray(state.v) / share)
+    return dataclasses.replace(state, v=np.asarray(state.v) / factor)
 
 
 @dataclass(frozen=True)
@@ -194,18 +194,18 @@ class HeavierRotors(Effect):
 
 @dataclass(frozen=True)
 class WeakerGravity(Effect):
-    """The scene's gravity times a share.
+    """The scene's gravity times a fraction.
 
-    share: from 0 to 1.
+    fraction: from 0 to 1.
     """
 
-    share: float
+    fraction: float
     key: ClassVar[str] = "weaker_gravity"
 
     def configure(self, model: pin.Model, robot: Robot) -> None:
         """Gravity is part of Pinocchio's model."""
-        model.gravity.linear = self.share * model.gravity.linear
+        model.gravity.linear = self.fraction * model.gravity.linear
 
     def describe(self) -> str:
         """One line for the description of a scene."""
-        return f"{100 * self.share:.0f} % of gravity, for continuation"
+        return f"{100 * self.fraction:.0f} % of gravity, for continuation"

@@ -23,7 +23,7 @@ from hovi.system.deadline import Deadline
 
 UNCHANGED = 1e-3
 """Relative change of the duration that counts as none, twice in a row."""
-EFFORT_SHARE = 1e-2
+EFFORT_FRACTION = 1e-2
 """Once the effort is less than this fraction of w T, its weight is only halved."""
 LARGEST_JUMP, LEAST_JUMP = 30.0, 2.0
 """Largest factor of the weight of time before that, and the least, which halves the effort's."""
@@ -98,7 +98,7 @@ class _Search:
         T, J = best.trajectory.duration, abs(action_of(best))
         if self.weight == 0:
             return float(J / T) or 1.0
-        wanted = J / (EFFORT_SHARE * T)
+        wanted = J / (EFFORT_FRACTION * T)
         return float(np.clip(wanted, LEAST_JUMP * self.weight, factor * self.weight))
 
     def _solved(self, weight: float, guess: Trajectory | None) -> Solution:

@@ -193,10 +193,10 @@ class Exploration:
         """What a message says of the guess of a refined motion: that of the nearest minimum."""
         if self.first is None:
             return ""
-        shares = np.linspace(0.0, 1.0, COMPARED_TIMES)
-        q = motion.configurations(shares * motion.duration)
+        fractions = np.linspace(0.0, 1.0, COMPARED_TIMES)
+        q = motion.configurations(fractions * motion.duration)
         known = [each.trajectory for each in self.minima]
-        far = [np.abs(k.configurations(shares * k.duration) - q).max() for k in known]
+        far = [np.abs(k.configurations(fractions * k.duration) - q).max() for k in known]
         nearest = self.minima[int(np.argmin(far))]
         by_path = any(nearest.trajectory is each for each in self.by_path)
         return self.first.sentence(by_path, nearest.success)

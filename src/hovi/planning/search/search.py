@@ -42,10 +42,10 @@ from hovi.system.progress import Progress
 
 COARSE_INTERVALS = 80
 """Number of intervals of the coarse grid, used first for grids with more than twice as many."""
-EXPLORATION_SHARE = 0.7
-"""Share of the time limit for the exploration, if its minima are refined afterwards."""
-SOLVING_SHARE = 0.9
-"""Share of the time limit for solving, if the best motion is compared with a finer grid after."""
+EXPLORATION_FRACTION = 0.7
+"""Fraction of the time limit for the exploration, if its minima are refined afterwards."""
+SOLVING_FRACTION = 0.9
+"""Fraction of the time limit for solving, if a finer grid is compared afterwards."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,7 +155,7 @@ class Search:
     ) -> tuple[Solution, tuple[float, ...]]:
         """As run, if the exploration at the first duration found no minimum."""
         tried = [(self.fine, explored.minima[0])]
-        probing = dataclasses.replace(self, deadline=self.deadline.part(EXPLORATION_SHARE))
+        probing = dataclasses.replace(self, deadline=self.deadline.part(EXPLORATION_FRACTION))
         for T in free.probes(self.fine.problem().limited):
             fine, best = tried[-1]
             if best.success or best.status in STOPPED or interrupted():
@@ -287,7 +287,7 @@ class Search:
         """The minima from all starts; uses part of the time if they are refined afterwards."""
         options = job.options
         whole = job is self.fine and job.tolerance is None and self.free is None
-        deadline = self.deadline.part(SOLVING_SHARE if whole else EXPLORATION_SHARE)
+        deadline = self.deadline.part(SOLVING_FRACTION if whole else EXPLORATION_FRACTION)
         pool = Pool(job, options.processes or default_processes(), deadline, self.free)
         first = self._first_guesses(job, deadline)
         return explore(pool, first, options.starts, options.seed, self.progress)
@@ -325,8 +325,8 @@ class Search:
 
         Raises KeyboardInterrupt if an interrupt came before the last stage.
         """
-        share = SOLVING_SHARE if self.fine.tolerance is None else 1.0
-        stages = FinalStages(self.fine, self.deadline.part(share), self.progress)
+        fraction = SOLVING_FRACTION if self.fine.tolerance is None else 1.0
+        stages = FinalStages(self.fine, self.deadline.part(fraction), self.progress)
         yield (found := self._continued(job, found))
         if self.fine.tolerance is not None and self.free is None:
             raise_if_interrupted()

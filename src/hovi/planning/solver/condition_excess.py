@@ -42,7 +42,7 @@ class ConditionBounds(SampledBounds):
     def excess(self, trajectory: Trajectory, least: float) -> Array:
         """Excess over lower and upper bounds in every interval, (2, N, size).
 
-        In shares of the scale, such that one that is tolerated is at most `least`.
+        As a fraction of the scale, such that one that is tolerated is at most `least`.
         """
         over = excess_of(trajectory, self, np.isfinite(self.upper))[1][:, 0]
         return np.stack(np.split(over - (self.tolerance - least), 2, axis=1))
@@ -52,7 +52,7 @@ class ConditionBounds(SampledBounds):
         return -float(excess_along(trajectory, self).upper.max())
 
     def worst(self, trajectory: Trajectory) -> tuple[float, str]:
-        """The largest excess in shares of the scale, and the value, time and bound, as a clause."""
+        """The largest excess as a fraction of the scale, and the value, time and bound in words."""
         found = excess_along(trajectory, self)
         over = np.where(np.isfinite(self.upper), found.upper, -np.inf)[:, 0]
         k, column = np.unravel_index(int(np.argmax(over)), over.shape)

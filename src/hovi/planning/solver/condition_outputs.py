@@ -62,7 +62,7 @@ class ConditionOutputs(PointOutputs):
         return np.concatenate(parts, axis=2)
 
     def worst(self, trajectory: Trajectory, tolerance: float) -> tuple[float, str]:
-        """The condition that is exceeded most, in shares of its scale."""
+        """The condition that is exceeded most, as a fraction of its scale."""
         return max(ConditionBounds(each).worst(trajectory) for each in self.given)
 
     def expand(self, at: Points, force: Array) -> ExpandedOutputs:

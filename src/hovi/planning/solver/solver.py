@@ -26,7 +26,7 @@ from hovi.optimize.start import Start
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.notation.ends import End
 from hovi.planning.problem.problem import TrajectoryProblem
-from hovi.planning.problem.tolerance import LAST_BARRIER, REMAINING_SHARE, Accuracy
+from hovi.planning.problem.tolerance import LAST_BARRIER, REMAINING_FRACTION, Accuracy
 from hovi.planning.problem.units import as_time_limit, seconds
 from hovi.planning.solver.answer import Answer, answered
 from hovi.planning.solver.initial_path import guess_path, turned_on
@@ -355,7 +355,7 @@ def solve_on_grid(
         time_limit=time_limit,
         escape_saddles=escape_saddles,
         barrier=barrier,
-        enough=REMAINING_SHARE * barrier,
+        enough=REMAINING_FRACTION * barrier,
     )
     started, start = time.perf_counter(), dataclasses.replace(begun, x=path)
 

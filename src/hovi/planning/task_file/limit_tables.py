@@ -78,7 +78,7 @@ def _check_kind(
 
 
 def _alone(limits: Mapping[str, Any], kind: str, given: Any) -> dict[str, Any]:
-    """A table with one kind of limits; shares also need the base, and the ranges it may lack."""
+    """A table with one kind of limits; fractions also need the base, and the ranges it may lack."""
     parts = list(given.values()) if isinstance(given, dict) else given
     parts = parts if isinstance(parts, list) else [parts]
     if kind in ("q", *NAMED) or not any(isinstance(each, str) for each in parts):

@@ -64,16 +64,16 @@ _POSITION_BOUNDS = (
     "a positive number, a list with a positive number or a pair [lower, upper] for each joint, "
     "or a table of joint names"
 )
-Share = Annotated[str, Field(pattern=r"^ *[0-9.]+([eE][+-]?[0-9]+)? *% *$"), Tag("<text>")]
+Fraction = Annotated[str, Field(pattern=r"^ *[0-9.]+([eE][+-]?[0-9]+)? *% *$"), Tag("<text>")]
 Bound = Annotated[
-    Annotated[float, Tag("<number>")] | Annotated[list[float], Tag("<list>")] | Share,
+    Annotated[float, Tag("<number>")] | Annotated[list[float], Tag("<list>")] | Fraction,
     Discriminator(_kind_or_text),
 ]
 Bounds = Annotated[
     Annotated[float, Tag("<number>")]
     | Annotated[list[Bound], Tag("<list>")]
     | Annotated[dict[str, Bound], Tag("<table>")]
-    | Share,
+    | Fraction,
     Discriminator(_kind_or_text),
 ]
 _BOUNDS = (

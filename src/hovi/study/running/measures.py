@@ -21,8 +21,8 @@ Array = npt.NDArray[np.float64]
 
 SAMPLES_PER_INTERVAL, MAX_SAMPLES = 20, 20_000
 """Samples at which peaks are looked for, of an interval and of a motion."""
-UNTOUCHED_SHARE = 0.05
-"""Share of a time limit below which the limit has changed nothing: all parts of a plan get more."""
+UNTOUCHED_FRACTION = 0.05
+"""Fraction of a time limit below which it changed nothing: all parts of a plan get more."""
 
 
 def row_of(solution: Solution, warned: str, seconds: float, limit: float | None) -> PlanRow:
@@ -32,7 +32,7 @@ def row_of(solution: Solution, warned: str, seconds: float, limit: float | None)
     """
     motion = solution.trajectory
     peaks = _peaks(motion)
-    out_of_time = limit is not None and seconds > UNTOUCHED_SHARE * limit
+    out_of_time = limit is not None and seconds > UNTOUCHED_FRACTION * limit
     return PlanRow(
         status=str(solution.status),
         success=bool(solution.success),

@@ -37,7 +37,7 @@ from hovi.system.dataclass import dataclass
 from hovi.version import __version__
 
 LEAST_GAIN = 1e-6
-"""Share by which a minimum from a plan's own guess has to cost less than one from a parent's."""
+"""Fraction by which a minimum from a plan's own guess has to cost less than one from a parent's."""
 
 
 @dataclass(frozen=True)

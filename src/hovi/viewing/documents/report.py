@@ -166,10 +166,10 @@ def _margins(trajectory: Trajectory) -> Iterator[Row]:
         for k, kind in enumerate(KINDS[: len(margin)]):
             if np.isfinite(margin[k]).any():
                 joint = int(np.argmin(margin[k]))
-                share = f"{100 * float(margin[k, joint]):.2g} % of the range"
+                percent = f"{100 * float(margin[k, joint]):.2g} % of the range"
                 yield (
                     f"margin to the {whose} on {kind}",
-                    (f"{share}, at {trajectory.coordinate_names[joint]}"),
+                    (f"{percent}, at {trajectory.coordinate_names[joint]}"),
                 )
     if kept is not None:
         clearance, distances = kept

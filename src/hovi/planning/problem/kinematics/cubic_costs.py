@@ -22,9 +22,9 @@ def cubic_costs(
     q0, q1: shape (P, nq). duration: of each cubic, which starts at `begin`, in [s].
     """
     T, s = duration, (POINTS + 1) / 2
-    shares = [s**2 * (3 - 2 * s), 6 * s * (1 - s) / T, (6 - 12 * s) / T**2, -12 * s**0 / T**3]
+    basis = [s**2 * (3 - 2 * s), 6 * s * (1 - s) / T, (6 - 12 * s) / T**2, -12 * s**0 / T**3]
     step = robot.difference(q0, q1)
-    jet = [(row[:, None, None] * step).reshape(-1, robot.nv) for row in shares]
+    jet = [(row[:, None, None] * step).reshape(-1, robot.nv) for row in basis]
     jet[0] = robot.integrate(np.tile(q0, (len(s), 1)), jet[0])
     t = np.repeat(begin + s * T, len(q0))
     value = lagrangian.value(*jet[: lagrangian.order + 1], t=t)

@@ -80,11 +80,11 @@ def _newton(robot: Robot, off: PoseDifference, q: Array, lower: Array, upper: Ar
         step *= min(1.0, MAX_STEP / max(float(np.max(np.abs(step))), 1e-300))
         candidate = inside(robot, robot.integrate(q, step), lower, upper)
         new, slope = linear(off, candidate, v)
-        share = np.linalg.norm(new) / np.linalg.norm(c)
-        if share < 1.0:
+        ratio = np.linalg.norm(new) / np.linalg.norm(c)
+        if ratio < 1.0:
             q, c, J = candidate, new, slope
-        damping = max(0.2 * damping, 1e-14) if share < 1.0 else 8.0 * damping
-        stalled = stalled + 1 if share > STALL_RATIO else 0
+        damping = max(0.2 * damping, 1e-14) if ratio < 1.0 else 8.0 * damping
+        stalled = stalled + 1 if ratio > STALL_RATIO else 0
         if stalled >= MAX_STALLED_STEPS:
             break
     return q

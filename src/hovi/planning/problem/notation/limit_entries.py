@@ -16,7 +16,7 @@ from hovi.robot.space.coordinates import Coordinates
 
 
 class Base(NamedTuple):
-    """Bounds of a kind that a share is of: the name of the limits, and both bounds, (nv,)."""
+    """Bounds of a kind for texts such as "50 %": the name of the limits, and both bounds, (nv,)."""
 
     name: Any
     lower: npt.NDArray[np.float64]
@@ -36,7 +36,7 @@ def entries(
 ) -> dict[int, tuple[float, float]]:
     """Bounds by index in v, from any of the accepted forms.
 
-    base: what texts such as "50 %" are fractions of; positions need none, as they take no shares.
+    base: what texts such as "50 %" are fractions of; positions need none.
     """
     found = _pairs(coordinates, kind, given, base)
     if kind == "q" and not coordinates.vector_joints:
@@ -85,18 +85,18 @@ def _bounds(
             f"limits.{kind} of {name!r} is {value!r}, and {what} has no share: give a pair lower < "
             "upper, or a `margin`, which keeps clear of both ends of all ranges."
         )
-    share = _share(kind, name, value)
+    fraction = _fraction(kind, name, value)
     lower, upper = float(base.lower[i]), float(base.upper[i])
     if np.isinf(lower) and np.isinf(upper):
         raise InputError(
             f"limits.{kind} of {name!r} is {value!r} of a limit, but {base.name!r} has none for "
             "this joint: give a number, or a base that has one."
         )
-    return share * lower, share * upper
+    return fraction * lower, fraction * upper
 
 
-def _share(kind: str, name: str, text: str) -> float:
-    """The share that a text such as "50 %" says. Raises InputError."""
+def _fraction(kind: str, name: str, text: str) -> float:
+    """The fraction that a text such as "50 %" says. Raises InputError."""
     number, unit = number_and_unit(text) or (0.0, "")
     if unit != "%" or not 0 < number <= 100:
         raise InputError(

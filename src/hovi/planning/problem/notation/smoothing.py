@@ -1,7 +1,7 @@
 """smooth = True: a cost on the jerk whose weight follows from the robot and the duration.
 
 A weight w rounds off what the motion of least effort does within sqrt(w) / M, with M the inertia of
-the joint. Here sqrt(w) / M is SMOOTHING_SHARE of the duration for the largest inertia, and longer
+the joint. Here sqrt(w) / M is SMOOTHING_FRACTION of the duration for the largest inertia, and more
 for all others: lighter joints get the same weight rather than one by their own inertia, since their
 torques cost so little that they would spin for free.
 """
@@ -25,12 +25,12 @@ from hovi.scene.scene import Scene, require_plannable
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
 
-SMOOTHING_SHARE = 0.01
+SMOOTHING_FRACTION = 0.01
 """Smoothing time of the largest inertia, as a fraction of the duration."""
 
 
 def smoothed(scene: Scene, start: State, goal: State | FrameGoal, duration: float) -> Scene:
-    """The scene with a cost on the jerk, w = (SMOOTHING_SHARE T M)^2.
+    """The scene with a cost on the jerk, w = (SMOOTHING_FRACTION T M)^2.
 
     M is the largest eigenvalue of the mass matrix at the ends, of its block of angles for joints
     that turn, and of its block of lengths for joints that slide. Where torques are free and
@@ -47,7 +47,7 @@ def smoothed(scene: Scene, start: State, goal: State | FrameGoal, duration: floa
     if squared is None:
         squared = _squared_inertias(scene, start, goal)
     with np.errstate(over="ignore", under="ignore"):
-        weight = (SMOOTHING_SHARE * duration * np.sqrt(squared)) ** 2
+        weight = (SMOOTHING_FRACTION * duration * np.sqrt(squared)) ** 2
     if not (np.isfinite(weight).all() and (weight > 0).all()):
         raise InputError(
             "smooth = true weights the jerk by the square of the duration, which is too short or "

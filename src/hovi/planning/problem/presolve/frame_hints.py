@@ -13,7 +13,7 @@ MILLIMETRE = 1e-3
 CENTIMETRE = 1e-2
 """A centimetre, in [m]."""
 NEAR_BASE = 0.05
-"""Share of the reach below which a goal is unlikely, as it is in the base: ten times as far, as in
+"""Fraction of the reach below which a goal is unlikely, as it is in the base: ten times as far, in
 centimetres, it is still within half of the reach."""
 FAR = 20.0
 """Distance from which a length may have been meant in millimetres, in [m]."""

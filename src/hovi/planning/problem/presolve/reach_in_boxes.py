@@ -56,16 +56,16 @@ def _undecided(
     origin, rotation, arms = _placed(chain, centers)
     turns = np.where(chain.angular != 0, widths, 0.0)
     moves = 2 * arms * np.sin(np.minimum(turns, np.pi) / 2) + np.abs(chain.linear) * widths
-    kept, share = np.ones(len(centers), dtype=bool), np.zeros_like(centers)
+    kept, fraction = np.ones(len(centers), dtype=bool), np.zeros_like(centers)
     if goal.position is not None:
         miss = np.linalg.norm(origin - np.asarray(goal.position), axis=1)
         kept &= miss <= moves.sum(axis=1) + ROUNDING
-        share += moves / np.maximum(miss, ROUNDING)[:, None]
+        fraction += moves / np.maximum(miss, ROUNDING)[:, None]
     angle = _angle(goal, rotation)
     if angle is not None:
         kept &= angle <= turns.sum(axis=1) + ROUNDING
-        share += turns / np.maximum(angle, ROUNDING)[:, None]
-    return kept, np.argmax(share[kept], axis=1)
+        fraction += turns / np.maximum(angle, ROUNDING)[:, None]
+    return kept, np.argmax(fraction[kept], axis=1)
 
 
 def _angle(goal: FrameGoal, rotation: Array) -> Array | None:

@@ -139,23 +139,23 @@ class EndState:
         turns = np.real(e.deriv().roots())  # of one that is not real the value is less
         return float(max(e(0.0), *e(np.clip(turns, 0.0, time)), 0.0))
 
-    def is_forced(self, over: Over, share: float, direction: int = 1) -> bool:
+    def is_forced(self, over: Over, fraction: float, direction: int = 1) -> bool:
         """Whether it exceeds its limit by more than the tolerance if so much is used.
 
         At the bound itself it is led back within the window, as if no more were available.
-        share: of what is available.
+        fraction: of what is available.
         """
         if over.now >= -self.slack(over):
-            time = self.least_time(over, share, direction, self.window)
+            time = self.least_time(over, fraction, direction, self.window)
             return time is None or self.peak(over, time) > self.slack(over)
-        profile = self._profile(over, share, direction)
+        profile = self._profile(over, fraction, direction)
         if profile.at_once:  # nothing bounds accelerations
             return over.now + self.peak(over, self.window) > self.slack(over)
         return profile.peak > self.slack(over)
 
-    def least_time(self, over: Over, share: float, direction: int, first: float) -> float | None:
+    def least_time(self, over: Over, fraction: float, direction: int, first: float) -> float | None:
         """The least time from a first one on by which it is led back; None within the motion."""
-        profile, time = self._profile(over, share, direction), first
+        profile, time = self._profile(over, fraction, direction), first
         profile = dataclasses.replace(profile, now=max(profile.now, 0.0))
         while time <= self.duration:
             if is_below(profile, over.powers(time), time):
@@ -163,15 +163,15 @@ class EndState:
             time *= STRIDE
         return None
 
-    def _profile(self, over: Over, share: float, direction: int) -> BrakingProfile:
+    def _profile(self, over: Over, fraction: float, direction: int) -> BrakingProfile:
         """How it goes on with a fraction of the acceleration and the jerk that lead it inside."""
         inwards = -over.side * (direction if over.kind % 2 else 1)
-        acceleration = share * float(self._available[int(inwards > 0), over.coordinate])
+        acceleration = fraction * float(self._available[int(inwards > 0), over.coordinate])
         torque = over.kind == KINDS.index("tau")
         rate, jerk = "torque_rate" if torque else "jerk", np.inf
         if rate in self.limits.kinds:
             side = self.limits.upper if inwards > 0 else -self.limits.lower
-            jerk = share * float(side[KINDS.index(rate), over.coordinate])
+            jerk = fraction * float(side[KINDS.index(rate), over.coordinate])
         rank = 0 if torque else 2 - over.kind
         return BrakingProfile(rank, over.now, over.rates, acceleration, jerk)
 

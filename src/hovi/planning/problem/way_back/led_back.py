@@ -8,8 +8,8 @@ from hovi.planning.problem.way_back.end_state import SHORTEST, STRIDE, EndState,
 from hovi.planning.problem.way_back.excused import Excused
 from hovi.robot.space.angle_ranges import beyond_in_degrees
 
-AVAILABLE_SHARE = 0.5
-"""Share of the accelerations available at the start that leading it back may ask for."""
+AVAILABLE_FRACTION = 0.5
+"""Fraction of the accelerations available at the start that leading it back may ask for."""
 MOST_EXCESS = 0.02
 """Largest excess that is led back, as a fraction of the range of positions or of another bound."""
 
@@ -22,7 +22,7 @@ def led_back(start: EndState, strict: bool) -> tuple[tuple[Excused, ...], str]:
     excused = list[Excused]()
     outside_first = sorted(start.over(), key=lambda over: over.now <= start.slack(over))
     for over in outside_first:
-        if not start.is_forced(over, AVAILABLE_SHARE):
+        if not start.is_forced(over, AVAILABLE_FRACTION):
             continue
         found = None if strict else _excused(start, over)
         if found is None and KINDS[over.kind] == "tau":
@@ -56,8 +56,8 @@ def refused(end: EndState, name: str, passed: bool = False) -> str:
 
 def _excused(start: EndState, over: Over) -> Excused | None:
     """How it is led back, within the window if the excess allows; None if it is too large."""
-    least = start.least_time(over, AVAILABLE_SHARE, 1, SHORTEST * start.window)
-    until = start.least_time(over, AVAILABLE_SHARE, 1, start.window)
+    least = start.least_time(over, AVAILABLE_FRACTION, 1, SHORTEST * start.window)
+    until = start.least_time(over, AVAILABLE_FRACTION, 1, start.window)
     if until is None or least is None:
         return None
     most = _most(start, over)

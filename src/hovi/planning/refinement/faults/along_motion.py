@@ -35,7 +35,7 @@ INSTANTS = 2000
 """Least number of instants at which a Lagrangian without bounds is looked at."""
 MAX_CELLS = 20_000
 """Maximum number of cells of a motion."""
-LEAST_SHARE = 2.0**-34
+LEAST_FRACTION = 2.0**-34
 """Shortest cell, relative to the duration."""
 _RULES = [np.polynomial.legendre.leggauss(points) for points in (4, 6)]
 _S = np.concatenate([(x + 1) / 2 for x, _ in _RULES])
@@ -165,7 +165,7 @@ class _Look:
         error_of: errors, (P,), names of what causes them, and a number of each cell, (P,),
         which is returned, too.
         """
-        grid, limit = self.motion.grid, LEAST_SHARE * self.motion.duration
+        grid, limit = self.motion.grid, LEAST_FRACTION * self.motion.duration
         errors, names, values = error_of(cells)
         while errors.sum() > self.budget:
             cut = errors > self.budget / (2 * len(cells))

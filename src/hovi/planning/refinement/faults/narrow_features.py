@@ -28,7 +28,7 @@ from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 
-SHARE = 0.05
+ESTIMATE_FRACTION = 0.05
 """Error that the integral along the curve may have, relative to the estimate of the cost's."""
 LEAST_ERROR = 1e-8
 """Least such error, relative to the cost."""
@@ -93,14 +93,14 @@ def features_of(solution: Solution) -> Features | None:
         return None
     values = problem.ld.values(motion.path)
     size = max(abs(solution.cost), least_cost(problem), 1e-300)
-    along = along_motion(lagrangian, motion, size, max(SHARE * estimate, LEAST_ERROR))
+    along = along_motion(lagrangian, motion, size, max(ESTIMATE_FRACTION * estimate, LEAST_ERROR))
     if has_own_curve(problem):
         missed = abs(along.cost - float(values.sum()))
     else:
         missed = abs(along.cost - integral_along(lagrangian, motion).value)
     error = (missed + along.error) / size
     least = RESOLVED if chosen is None else CURVE_TOLERANCE
-    allowed = (1.0 + 2.0 * SHARE) * max(min(estimate, RESOLVED), least)
+    allowed = (1.0 + 2.0 * ESTIMATE_FRACTION) * max(min(estimate, RESOLVED), least)
     return Features(along, values, size, float(np.nan_to_num(error, nan=np.inf)), allowed)
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from hovi.discrete.curve_integral import integral_along
 from hovi.discrete.trajectory import Trajectory
 from hovi.planning.problem.problem import TrajectoryProblem
-from hovi.planning.refinement.passive_torque import NEGLIGIBLE_SHARE, passive_torque
+from hovi.planning.refinement.passive_torque import NEGLIGIBLE_FRACTION, passive_torque
 from hovi.planning.solver.outcome.cost_with_time import cost_of, price_of_time
 from hovi.planning.solver.solver import Solution
 from hovi.schemes import is_galerkin
@@ -107,7 +107,7 @@ def least_cost(problem: TrajectoryProblem) -> float:
 def _fault_of_passive(problem: TrajectoryProblem, trajectory: Trajectory) -> str:
     """The torque of a passive joint between the points; "" if it is negligible."""
     found = passive_torque(problem, trajectory)
-    if found is None or found.share <= NEGLIGIBLE_SHARE:
+    if found is None or found.fraction <= NEGLIGIBLE_FRACTION:
         return ""
     return (
         f"joint {found.joint!r} is passive, but carries up to {found.torque:.3g} N m between the "

@@ -18,8 +18,8 @@ class PassiveJoints(Requirement):
 
     def violation(self, motion: Trajectory) -> str:
         """The largest torque of a passive joint, relative to that of any joint."""
-        share = ActionObjective(self.problem).residuals(motion.path).torque_fraction
-        if share <= MET:
+        fraction = ActionObjective(self.problem).residuals(motion.path).torque_fraction
+        if fraction <= MET:
             return ""
         joints = passive_joints(self.problem)
-        return f"the torque at passive joint {joints} is {share:.3g} of the largest"
+        return f"the torque at passive joint {joints} is {fraction:.3g} of the largest"
