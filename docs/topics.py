@@ -10,7 +10,7 @@ TOPICS = {
         *("State", "FrameGoal", "Via", "Periodic", "plan_sequence", "Segment"),
     ],
     "Limits": ["Limits", "as_limits", "limit_sets", "LimitSet", "LimitSource"],
-    "Conditions": ["Condition", "Between", "Equal", "AtTimes"],
+    "Conditions": ["Condition", "Between", "Equal", "AtTimes", "Function", "Points"],
     "Obstacles and what is grasped": [
         *("Box", "Sphere", "Capsule", "Cylinder", "HalfSpace", "ConvexHull", "Mesh"),
         *("ConvexParts", "PointCloud", "ObstaclePath", "Clearance", "load_obstacles"),

@@ -18,7 +18,7 @@ import pytest
 from hovi.__main__ import EXTENSION_MODULE, INTERRUPTION_MODULE
 
 TOP = Path(__file__).resolve().parents[1]
-FOLDERS = ("src", "tests", "examples", "docs", "models", ".ci")
+FOLDERS = ("src", "tests", "examples", "docs", "models", ".ci", ".github")
 TABLES = "docs/tables/"
 BUILT = ("docs/_build", "docs/gallery")
 TEXTS = {"", ".cpp", ".hpp", ".in", ".markdown", ".md", ".py", ".pyi", ".rst", ".toml", ".txt"}

@@ -44,6 +44,8 @@ from .flows.symmetry import base_rotation as base_rotation
 from .flows.symmetry import base_translation as base_translation
 from .planning.clearance.clearance import Clearance as Clearance
 from .planning.conditions.condition import Condition as Condition
+from .planning.conditions.function import Function as Function
+from .planning.conditions.function import Points as Points
 from .planning.conditions.places import AtTimes as AtTimes
 from .planning.conditions.sets import Between as Between
 from .planning.conditions.sets import Equal as Equal

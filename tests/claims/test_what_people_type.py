@@ -77,7 +77,7 @@ def test_a_rotation_of_three_digits_is_the_nearest_one(scene: hovi.Scene) -> Non
 @pytest.mark.parametrize(
     ("option", "instead"),
     [
-        ("constraints", "running cost"),
+        ("constraints", r"conditions=\[hovi.Condition\("),
         ("contacts", "not planned for: see docs/when_not.md"),
         ("velocity_scaling", "limits="),
         ("acceleration_scaling", "limits="),

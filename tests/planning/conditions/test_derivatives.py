@@ -106,9 +106,8 @@ def test_a_limit_on_the_power_is_of_the_joints_that_it_names(ur5: hovi.Robot) ->
 
 def test_a_function_of_ones_own_takes_part(ur5: hovi.Robot) -> None:
     """Values, slopes and curvature in Python, without CasADi."""
-    from hovi.planning.conditions.function import Curvature, Function, Slopes
 
-    class Energy(Function):
+    class Energy(hovi.Function):
         @property
         def needs(self) -> frozenset[str]:
             return frozenset({"v"})
@@ -117,13 +116,15 @@ def test_a_function_of_ones_own_takes_part(ur5: hovi.Robot) -> None:
         def size(self) -> int:
             return 1
 
-        def values(self, at: Points) -> np.ndarray:
+        def values(self, at: hovi.Points) -> np.ndarray:
             return 0.5 * np.vecdot(at.v, at.v)[:, None]
 
-        def slopes(self, at: Points) -> Slopes:
+        def slopes(self, at: hovi.Points) -> dict[str, np.ndarray]:
             return {"v": at.v[:, None]}
 
-        def curvature(self, at: Points, weights: np.ndarray) -> Curvature:
+        def curvature(
+            self, at: hovi.Points, weights: np.ndarray
+        ) -> dict[tuple[str, str], np.ndarray]:
             return {("v", "v"): weights[:, :, None] * np.eye(at.v.shape[1])}
 
     start, goal = np.array([0, -1.5, 1.5, 0, 0, 0.0]), np.array([1.0, -1.0, 1.0, 0.5, 0.5, 0.5])

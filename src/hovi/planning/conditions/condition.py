@@ -34,17 +34,18 @@ EVERYWHERE: Any = AtPoints()
 class Condition(Generic[Values, Place]):
     """y(q, v, a, tau, t) in a set, at instants of a motion.
 
-    Bounds hold at all times; a value, of a function of q, v and t, at given times.
+    Bounds of y(q, v, a, tau, t) hold at all times, values of y(q, v, t) at given times. Equations
+    along the whole motion are not supported.
 
     function: y: a formula as of the effect RunningCost, which may be a column, as in "tau * v"; a
         function that returns a CasADi expression of the arguments that it names, of q, v, a, tau
-        and t; or a Function.
+        and t; or a hovi.Function.
     on: hovi.Between(lower, upper) or hovi.Equal(value).
     where: hovi.AtTimes(times) for a value; left out for bounds.
     name: in messages. unit: of y, in messages. of: names of its entries there, such as joints.
-    scale: of y, one number or one for each entry: by default the range between its bounds, or the
-        size of the only one. Bounds that are functions of time need it.
-    tolerance: fraction of the scale by which a bound may be exceeded anywhere.
+    scale: of y, one number or one for each entry: by default upper - lower, or max(1, |bound|) of a
+        single bound. Bounds that are functions of time need it.
+    tolerance: fraction of the scale by which a bound may be exceeded anywhere, at least 1e-6.
     Raises InputError for anything else.
     """
 

@@ -12,17 +12,16 @@ from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 Slopes = Mapping[str, Array]
-"""dy / dx for each x of "q", "v", "a" and "tau" that y depends on, shape (P, size, nv)."""
+"""See `Function.slopes`."""
 Curvature = Mapping[tuple[str, str], Array]
-"""sum_i w_i d2 y_i / dx dx' by (x, x'), shape (P, nv, nv), without the transposed (x', x) of two
-different ones; what is left out is zero."""
+"""See `Function.curvature`."""
 ARGUMENTS = "q", "v", "a", "tau", "t"
 """What a function may depend on."""
 
 
 @dataclass(frozen=True, eq=False)
 class Points:
-    """A motion at P instants.
+    """A motion at P instants, of which a Function returns its values.
 
     q: configurations, shape (P, nq). v: velocities, (P, nv). t: times, (P,), in [s]. a, tau:
     accelerations and joint torques, (P, nv); None where no function needs them.
@@ -42,16 +41,18 @@ class Points:
 
 
 class Function(ABC):
-    """y of (q, v, a, tau, t) at one instant.
+    """The function y(q, v, a, tau, t) of a Condition, with its derivatives, without CasADi.
 
-    Derivatives in q are along `integrate`, and those in the others at fixed tau: whoever needs them
-    along a motion adds what comes through tau(q, v, a, t).
+    A class of one's own has `needs`, `size`, `values` and `slopes`, and `curvature` where y is not
+    linear. Its methods take the motion at P instants, as Points. Derivatives in q are in the
+    tangent space, along `Robot.integrate`; those in q, v and a are at fixed tau: hovi adds what
+    comes through tau(q, v, a, t).
     """
 
     @property
     @abstractmethod
     def needs(self) -> frozenset[str]:
-        """What it depends on, of ARGUMENTS."""
+        """What y depends on: some of "q", "v", "a", "tau" and "t"."""
 
     @property
     @abstractmethod
@@ -64,10 +65,16 @@ class Function(ABC):
 
     @abstractmethod
     def slopes(self, at: Points) -> Slopes:
-        """First derivatives: see Slopes."""
+        """dy / dx by x, for each x in `needs` but t, shape (P, size, nv)."""
 
     def curvature(self, at: Points, weights: Array) -> Curvature:
-        """Weighted second derivatives, see Curvature; weights: shape (P, size). None by default."""
+        """sum_i w_i d2 y_i / dx dx' by (x, x'), shape (P, nv, nv); zero by default.
+
+        What is left out is zero. Of two different x and x', one order alone: (x', x) is its
+        transpose.
+
+        weights: w, shape (P, size).
+        """
         return {}
 
     def is_spurious(self, at: Points) -> bool:

@@ -24,8 +24,9 @@ _ACCELERATIONS = (
     "give limits, such as {a} of those that the maker of an arm publishes, or numbers in rad/s^2"
 )
 _OPTIONS = {
-    "constraints": "conditions of your own along a motion are not supported, a stiff running cost "
-    "comes near them: see docs/costs.md and docs/when_not.md",
+    "constraints": "give hovi.plan conditions of your own, such as "
+    'conditions=[hovi.Condition("tau * v", hovi.Between(-80, 80), name="power")]: see '
+    "docs/howto/limits.md",
     "contacts": "contacts are not planned for: see docs/when_not.md",
     "velocity_scaling": _VELOCITIES,
     "max_velocity_scaling_factor": _VELOCITIES,
