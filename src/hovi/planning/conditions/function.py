@@ -34,7 +34,7 @@ class Points:
     tau: Array | None = None
 
     def argument(self, name: str) -> Array:
-        """One of ARGUMENTS as a matrix with a row per instant."""
+        """One of q, v, a, tau and t by its name, shape (P, number of entries)."""
         found = getattr(self, name)
         assert found is not None
         return np.asarray(found.reshape(len(self.q), -1))
