@@ -47,7 +47,7 @@ for duration in (1.0, 0.5, 0.25, 0.125):
     assert solution.success
 
 # %%
-# Save a changed task. Its URDF is copied beside it, so the folder is self-contained.
+# Save a changed task. Its URDF is copied next to it, so the folder is self-contained.
 
 slower = dataclasses.replace(task, duration=1.5).with_options(intervals=24)
 path = hovi.save_task(slower, folder / "slower_reach.toml")

@@ -46,7 +46,7 @@ SCRIPTS = (
 )
 
 PEER = [f"--peer={os.environ['TASKS_PEER']}"] if "TASKS_PEER" in os.environ else []
-"""The Python of an environment with OMPL and TOPP-RA, beside which tasks are planned."""
+"""The Python of an environment with OMPL and TOPP-RA, next to which tasks are planned."""
 
 LONG = {
     "tasks": ("tasks.py", *PEER),

@@ -20,7 +20,7 @@ import hovi
 
 LINKS = (5, 7, 10, 14)
 SETTINGS = {"16 intervals": {"intervals": 16}, "defaults": {}}
-SHARE, DURATION = 0.8, 2.0
+FRACTION, DURATION = 0.8, 2.0
 
 
 def measure(links: int, setting: str, time_limit: float) -> list[str]:
@@ -39,12 +39,12 @@ def measure(links: int, setting: str, time_limit: float) -> list[str]:
     hovi.plan(scene, start, start + 0.01, 1.0, limits={"base": "none", "v": 1.0}, intervals=4)
     seconds, free = timed(lambda: plan("none"))
     peak = float(np.abs(free.trajectory.sample(np.linspace(0.0, DURATION, 5001)).v).max())
-    limits = {"base": "none", "v": SHARE * peak}
+    limits = {"base": "none", "v": FRACTION * peak}
     limited_seconds, limited = timed(lambda: plan(limits))
     bounds = hovi.as_limits(scene.robot, limits)
     return [
         f"{links} links, {setting}",
-        f"{SHARE * peak:.3g}",
+        f"{FRACTION * peak:.3g}",
         f"{seconds:.2g}, {free.nit}, {free.status}",
         f"{limited_seconds:.2g}",
         f"{limited.nit}",

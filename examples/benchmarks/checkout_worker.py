@@ -23,7 +23,7 @@ from typing import Any
 JUDGING = 600.0
 """Processor time that everything but a problem itself may take, in [s]."""
 POINTS, REPEATS = 10_000, 3
-"""Points of the UR5 kernel whose time is measured beside every problem, and how often."""
+"""Points of the UR5 kernel whose time is measured next to every problem, and how often."""
 KERNELS = {
     "hovi.dynamics.inverse_dynamics_kernel": "InverseDynamicsKernel",
     "hovi.dynamics.mimic_kernel": "MimicKernel",
@@ -196,7 +196,7 @@ class Runner:
 
 
 def row_of(name: str, each: Any, known: Any, judge: Callable[[Any], str]) -> dict[str, Any]:
-    """What is told of an outcome. known: hash and judgement of a motion that may be the same."""
+    """The row of an outcome. known: hash and judgement of a motion that may be the same."""
     has_motion = each.motion is not None
     row = {
         "name": name,

@@ -115,6 +115,6 @@ def judged_motion(asked: Asked, samples: int | None = None) -> Callable[[Outcome
 
 
 def at_rest(q: Any) -> tuple[Array, Array]:
-    """A configuration and no velocity, for robots whose nv their model tells later."""
+    """A configuration and no velocity, for robots whose nv their model says later."""
     q = np.asarray(q, dtype=float)
     return q, np.zeros(1)

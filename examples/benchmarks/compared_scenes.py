@@ -40,7 +40,7 @@ LONGEST_FIRST = ("tiago_reaches_table", "z1_into_drawer", "panda_out_of_bin", "x
 QUICK_TASKS = ("four_axis_sorts", "ur5_bin_to_bin", "panda_hand_past_its_base", "ur5_into_shelf")
 CLEARANCE_SAMPLES = 10_001
 LEAST_CLEARANCE = 0.995
-"""Share of the margin that the meshes of a success keep at all samples."""
+"""Fraction of the margin that the meshes of a success keep at all samples."""
 GOAL_MISS = 1e-5
 """Largest distance of a frame from its goal, in [m], and of the directions of two axes."""
 

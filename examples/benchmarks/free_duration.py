@@ -81,9 +81,9 @@ def cells(row: Row) -> list[str]:
     """The numbers of a row as text, ratios included."""
     T, steps, given_steps, seconds, given, slope, success = row
     steps_ratio, ratio = steps / given_steps, seconds / given
-    marked = "" if success else " (not resolved)"
+    note = "" if success else " (not resolved)"
     return [
-        f"{T:.3f}{marked}",
+        f"{T:.3f}{note}",
         *(f"{steps:.0f}", f"{given_steps:.0f}", f"{steps_ratio:.1f}"),
         *(f"{1e3 * seconds:.0f}", f"{1e3 * given:.0f}", f"{ratio:.1f}"),
         f"{slope:.0e}",

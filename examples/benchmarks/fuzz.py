@@ -75,8 +75,8 @@ def work(kind: str, seed: int, numbers: range) -> None:
 def watch(kind: str, seed: int, numbers: range) -> Iterator[Result]:
     """The results of a fraction of the inputs, restarting the process after a crash or a hang."""
     while numbers:
-        share = [kind, str(seed), str(numbers.start), str(numbers.stop), str(numbers.step)]
-        command = [sys.executable, "-W", "error", __file__, "--work", *share]
+        part = [kind, str(seed), str(numbers.start), str(numbers.stop), str(numbers.step)]
+        command = [sys.executable, "-W", "error", __file__, "--work", *part]
         with subprocess.Popen(
             command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, bufsize=0
         ) as process:
@@ -109,9 +109,9 @@ def _line(process: subprocess.Popen[bytes], seconds: float) -> tuple[bytes, bool
 def fuzz(kind: str, seed: int, count: int) -> list[Result]:
     """The results of all inputs of one kind, loaded by one process per processor."""
     cores = len(os.sched_getaffinity(0))
-    shares = [range(first, count, cores) for first in range(cores)]
+    parts = [range(first, count, cores) for first in range(cores)]
     with ThreadPoolExecutor(cores) as pool:
-        parts = pool.map(lambda numbers: list(watch(kind, seed, numbers)), shares)
+        parts = pool.map(lambda numbers: list(watch(kind, seed, numbers)), parts)
     return [result for part in parts for result in part]
 
 

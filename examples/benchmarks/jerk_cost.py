@@ -42,7 +42,7 @@ ARM = "panda"
 FINGERS = ["panda_finger_joint1", "panda_finger_joint2"]
 LIMITS = "panda"
 """The limit set of the arm."""
-SHARES = (0.002, 0.005, 0.01, 0.02, 0.05)
+FRACTIONS = (0.002, 0.005, 0.01, 0.02, 0.05)
 """Smoothing times of the heaviest joint, of the duration; `smooth` has the middle one."""
 STATIC_FRACTION, DURATIONS = 0.9, (1.5, 3.0)
 """Largest static torque at the ends, of its limit; durations, in times at the velocity limits."""
@@ -203,10 +203,10 @@ def weights() -> None:
         ("least effort", task.scene, "urdf"),
         ("least effort, a limited", task.scene, {"base": "urdf", "a": ACCELERATIONS}),
     ]
-    for share in SHARES:
-        cost = hovi.effects.JerkCost(float((share * task.duration * M) ** 2))
+    for fraction in FRACTIONS:
+        cost = hovi.effects.JerkCost(float((fraction * task.duration * M) ** 2))
         scene = hovi.Scene(task.scene.robot, [*task.scene.effects, cost])
-        plans.append((f"T / {1 / share:.0f}", scene, "panda"))
+        plans.append((f"T / {1 / fraction:.0f}", scene, "panda"))
     rows = []
     for name, scene, limits in plans:
         began = time.perf_counter()

@@ -147,7 +147,7 @@ def quantiles(values: list[float], form: str) -> str:
     """The median and the 90 % point as text."""
     if not values:
         return "-"
-    return ", ".join(f"{np.quantile(values, share):{form}}" for share in (0.5, 0.9))
+    return ", ".join(f"{np.quantile(values, fraction):{form}}" for fraction in (0.5, 0.9))
 
 
 def measure_box_fddp(scene: str, move: float, laps: int, python: str) -> dict[str, object]:

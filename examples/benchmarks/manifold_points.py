@@ -18,7 +18,7 @@ from hovi.dynamics.inverse_dynamics_kernel import InverseDynamicsKernel
 from hovi.planning.solver.solver import guess_path
 
 INTERVALS = (16, 256)
-BESIDE = {"kinova": "kinova, revolute", "free-flyer, 3 joints": "nine joints"}
+COMPARED = {"kinova": "kinova, revolute", "free-flyer, 3 joints": "nine joints"}
 """Robots on groups, and the robots of ordinary joints that they are compared with."""
 ROUNDS, SECONDS = 5, 0.5
 
@@ -102,14 +102,14 @@ def by_turns(pair: tuple[Callable[[], object], ...]) -> list[float]:
 
 def rows_of(name: str, intervals: int) -> list[list[object]]:
     """A row for the robot of ordinary joints, and one for the other with the ratios of times."""
-    names = BESIDE[name], name
+    names = COMPARED[name], name
     first: list[object] = [names[0], intervals]
     second: list[object] = [names[1], intervals]
     for digits, work in zip((2, 1, 2), alone(measure, names, intervals), strict=True):
         per_point = 1e6 * np.array(work) / (4 * intervals)  # (robots, rounds)
-        beside, own = np.median(per_point, axis=1)
+        compared, own = np.median(per_point, axis=1)
         factors = np.sort(per_point[1] / per_point[0])
-        first.append(f"{beside:.{digits}f}")
+        first.append(f"{compared:.{digits}f}")
         middle = f"{np.median(factors):.1f}"
         spread = f"{factors[0]:.1f} to {factors[-1]:.1f}"
         second.append(f"{own:.{digits}f} ({middle} times; {spread})")
@@ -122,7 +122,7 @@ def main() -> None:
         "Microseconds of processor time per quadrature point, `galerkin-2`, one thread: medians of "
         f"{ROUNDS} rounds, and how many times those of the row above, with the rounds' range.\n"
     )
-    rows = [row for N in INTERVALS for name in BESIDE for row in rows_of(name, N)]
+    rows = [row for N in INTERVALS for name in COMPARED for row in rows_of(name, N)]
     print_table(["robot", "N", "kernel alone", "value, gradient, Hessian", "value"], rows)
     print_machine()
 

@@ -143,7 +143,7 @@ def main() -> None:
             scene.write_text(tomlkit.dumps(task(changes)))
             least = min(told_after(scene, sentence) for _ in range(RUNS))
             rows.append([mistake, f"... {sentence} ...", least])
-    print_table(["mistake", "told", "processor s"], rows)
+    print_table(["mistake", "reported", "processor s"], rows)
     print_machine()
 
 

@@ -13,7 +13,7 @@ Faults are drawn at random from all mutations of `mutations.py`. Each is put int
 tree, in which the tests that run the changed statement run, the cheapest of every test file first,
 until one fails; what they pass is checked by `mypy --strict`, which is part of CI too. A mutant
 that takes far longer than its tests do is noticed as well. Results are kept in the folder --work,
-beside the copy; the checkout is never changed.
+next to the copy; the checkout is never changed.
 """
 
 from __future__ import annotations

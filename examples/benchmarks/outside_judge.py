@@ -26,7 +26,7 @@ MAX_MISS = 2e-6
 MAX_PASSIVE = 2e-2
 """Largest accepted torque of passive joints along the curve, as a fraction of all torques."""
 MAX_LED_BACK = 0.02
-"""Share of a limit's range from which a start may be led back."""
+"""Fraction of a limit's range from which a start may be led back."""
 GAUSS_POINTS, SAMPLES = 48, 20_001
 """Points per interval of the integral, and times at which limits are checked."""
 ROWS = "q", "v", "a", "tau"
@@ -211,9 +211,9 @@ def _led_back(asked: Asked, row: int, t: Array) -> tuple[Array, Array, str]:
         return lower, upper, ""
     low, high = np.tile(lower, (len(t), 1)), np.tile(upper, (len(t), 1))
     for each in own:
-        share = each.excess / (upper[each.joint] - lower[each.joint])
-        if not share <= MAX_LED_BACK:
-            return low, high, f"led back from {share:.1e} beyond {ROWS[row]}"
+        fraction = each.excess / (upper[each.joint] - lower[each.joint])
+        if not fraction <= MAX_LED_BACK:
+            return low, high, f"led back from {fraction:.1e} beyond {ROWS[row]}"
         begins = t < each.until
         low[begins, each.joint] -= each.excess
         high[begins, each.joint] += each.excess

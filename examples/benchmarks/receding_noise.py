@@ -33,7 +33,7 @@ DURATION, STEP, REST = 1.2, 0.01, 0.3
 NOISE = 1e-5, 1e-3
 """Of positions in [rad], and of velocities in [rad/s]."""
 POINTS = 10_000
-"""Of the kernel, whose time is printed beside those of the calls."""
+"""Of the kernel, whose time is printed next to those of the calls."""
 CHECKED, SAMPLES = 10, 2_000
 """Every which motion is checked, and at how many samples."""
 
@@ -116,12 +116,12 @@ def row(limit: float | None, of: dict[str, object]) -> list[str]:
     counted = times[:, 1] >= (-np.inf if limit is None else 0.9) * times[:, 0]
     kinds, times, forced = kinds[counted], times[counted], forced[counted]
     late = times[:, 0] > 1.2 * (np.inf if limit is None else limit)
-    share = [f"{100 * np.mean(kinds == each):.2f}" for each in ("new", "braking", "neither")]
+    percent = [f"{100 * np.mean(kinds == each):.2f}" for each in ("new", "braking", "neither")]
     median, most = np.quantile(times[:, 1], [0.5, 0.99])
     return [
         "none" if limit is None else f"{1e3 * limit:g} ms",
         f"{len(kinds)}",
-        *share,
+        *percent,
         f"{100 * (forced > 0).mean():.0f}",
         f"{forced.max():.1e}",
         f"{max(found.max(initial=0.0), 0.0):.0e}",

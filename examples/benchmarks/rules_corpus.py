@@ -66,11 +66,11 @@ def _given(name: str) -> hovi.Scene:
     return hovi.Scene(hovi.load_robot(name), [hovi.effects.Gravity()])
 
 
-def _ends(robot: hovi.Robot, seed: int, share: float) -> tuple[Array, Array]:
+def _ends(robot: hovi.Robot, seed: int, fraction: float) -> tuple[Array, Array]:
     """Two configurations in a fraction of the ranges, or of 2.5 rad to both sides."""
     rng = np.random.default_rng(seed)
     low, high = np.maximum(robot.lower, -2.5), np.minimum(robot.upper, 2.5)
-    mid, half = (low + high) / 2, (high - low) / 2 * share
+    mid, half = (low + high) / 2, (high - low) / 2 * fraction
     a, b = (mid + half * rng.uniform(-1, 1, robot.nq) for _ in range(2))
     return a, b
 
@@ -98,10 +98,10 @@ def _tight(name: str, seed: int, ratio: float) -> Problem:
     return run
 
 
-def _between(name: str, seed: int, share: float, duration: Any, **options: Any) -> Problem:
+def _between(name: str, seed: int, fraction: float, duration: Any, **options: Any) -> Problem:
     def run(nudge: int) -> hovi.Solution:
         scene = _given(name)
-        a, b = _ends(scene.robot, seed, share)
+        a, b = _ends(scene.robot, seed, fraction)
         return _plan(scene, nudged(a, scene.robot, nudge), b, duration, **options)
 
     return run
@@ -392,7 +392,7 @@ _problem("advance within torques")(_advanced(5e-3, limits={"tau": [150, 100, 90,
 _problem("advance without limits")(_advanced(1e-3, limits="none"))
 
 
-def _outside(share: float) -> Problem:
+def _outside(fraction: float) -> Problem:
     """From a start that is faster than its limit, or beyond a position."""
 
     def run(nudge: int) -> hovi.Solution:
@@ -400,7 +400,7 @@ def _outside(share: float) -> Problem:
         a, b = _ends(scene.robot, 4, 0.35)
         limits = {"v": 1.0, "a": 4.0}
         v = np.zeros(6)
-        v[[0, 2]] = 1.0 + share, -1.0 - share
+        v[[0, 2]] = 1.0 + fraction, -1.0 - fraction
         start = hovi.State(nudged(a, scene.robot, nudge), v)
         return _plan(scene, start, b, 2.5, limits=limits, self_collision=False)
 
@@ -581,14 +581,14 @@ def _guessed(nudge: int) -> hovi.Solution:
     return _plan(scene, start, b, 2.0, guess=fine.trajectory, limits="none", self_collision=False)
 
 
-def _late(share: float, duration: float) -> Problem:
+def _late(fraction: float, duration: float) -> Problem:
     """From a start that is faster than its limit, with little time."""
 
     def run(nudge: int) -> hovi.Solution:
         scene = _given("ur5")
         a, _ = _ends(scene.robot, 4, 0.35)
         v = np.zeros(6)
-        v[[0, 2]] = 1.0 + share, -1.0 - share
+        v[[0, 2]] = 1.0 + fraction, -1.0 - fraction
         start = hovi.State(nudged(a, scene.robot, nudge), v)
         goal = a + 0.6 * duration * v
         limits = {"v": 1.0, "a": 2.0}

@@ -322,7 +322,7 @@ _rule(
 )
 _rule(
     "short steps are no progress",
-    "Steps far shorter than the radius count as stalled while bounds are not met.",
+    "Steps far shorter than the radius count as stalled while bounds are not satisfied.",
     "_Iteration._try",
     "short and not (ended.feasible and length > NO_LENGTH)",
     "False",
@@ -547,7 +547,7 @@ _rule(
 _at("equations", "planning.solver.methods.bounded_search")
 _rule(
     "equations in the steps",
-    "Within limits steps meet conditions at nodes, instead of rounds.",
+    "Within limits steps satisfy conditions at nodes, instead of rounds.",
     "BoundedSearch.solve",
     "self._solved_under_conditions(start)",
     "None",
@@ -598,7 +598,7 @@ _rule(
 )
 _at("warm starts", "planning.solver.central_path")
 _rule(
-    "marked points",
+    "saved iterates",
     "A solve for other ends begins at a point where the barrier was larger.",
     "CentralPath.at",
     "large[-1] if large else self.points[0]",
@@ -942,7 +942,7 @@ _rule(
 _at("limits", "planning.solver.limits.graded_parts")
 _rule(
     "short parts at ends",
-    "Parts beside a given end near a bound are halved.",
+    "Parts next to a given end near a bound are halved.",
     "graded",
     "ends is not None",
     "False",
@@ -1007,7 +1007,7 @@ _rule(
 )
 _rule(
     "neighbours are halved, too",
-    "Intervals beside one that is halved are halved.",
+    "Intervals next to one that is halved are halved.",
     "_solved_on_halves",
     "worst[:-1]",
     "worst[:-1] & False",
@@ -1237,7 +1237,8 @@ _rule(
     "finer motion taken as it is",
     "A finer motion that was solved to the end is not solved again when it is finished.",
     "_finished",
-    "known.central.level <= SAME_LEVEL * barrier and meets(known.problem, known.trajectory.path)",
+    "known.central.level <= SAME_LEVEL * barrier "
+    "and satisfies(known.problem, known.trajectory.path)",
     "False",
 )
 _rule(
@@ -1348,7 +1349,7 @@ _rule(
 _at("search", "planning.search.multistart")
 _rule(
     "held ends",
-    "The end is held where a frame goal is met, if that fails with a free end.",
+    "The end is held where a frame goal is reached, if that fails with a free end.",
     "_attempts",
     "job.held_at(attempt.guess.q[-1]) if first.isolated or to_branch else None",
     "None",

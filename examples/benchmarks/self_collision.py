@@ -174,7 +174,7 @@ def measure(arm: str, count: int, seed: int) -> list[Run]:
 
 def row(arm: str, runs: list[Run]) -> list[object]:
     """A row of the table: one arm."""
-    met = [run for run in runs if run.free >= DEFAULT_MARGIN]
+    clear = [run for run in runs if run.free >= DEFAULT_MARGIN]
     bent = [run for run in runs if run.free < DEFAULT_MARGIN]
     good = [run for run in runs if run.status == "minimum"]
     return [
@@ -183,8 +183,8 @@ def row(arm: str, runs: list[Run]) -> list[object]:
         f"{sum(run.free == 0.0 for run in runs)}",
         f"{min((run.kept for run in good), default=np.nan):.6f}",
         f"{sum(run.false for run in runs)}",
-        f"{len(met)}",
-        middle_and_most([run.ratio for run in met], ".2f"),
+        f"{len(clear)}",
+        middle_and_most([run.ratio for run in clear], ".2f"),
         f"{len(bent)}",
         middle_and_most([run.ratio for run in bent], ".2f"),
     ]

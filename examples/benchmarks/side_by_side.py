@@ -9,7 +9,7 @@ compared_problems.py in turn, in processes of their own. Every success is judged
 class of problems passes if
 - no success is false, and none of BEFORE is lost: one that crashes or takes longer than it may is;
 - the optimiser takes at most 1.05 times the steps in the median;
-- it takes at most 1.1 times the time, in the median and in all. Times are processor times beside
+- it takes at most 1.1 times the time, in the median and in all. Times are processor times next to
   that of 10,000 points of the UR5 kernel in the same process at the same moment. What is slower is
   measured again before that is said;
 - with --bits, status, steps, cost and motion of every problem are the same to the last bit.

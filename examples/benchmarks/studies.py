@@ -5,7 +5,7 @@
     python studies.py cluster [COUNT]      # two-link reaches on a local Dask cluster, peak memory
     python studies.py restarted [COUNT]    # the same, with a scheduler that is killed in the middle
     python studies.py warm [SIDE] [ROBOT]  # a grid of goals (ur5, panda), from neighbours' motions
-    python studies.py cost [COUNT]         # what a plan costs beside its own time, for the docs
+    python studies.py cost [COUNT]         # what a plan costs besides its own time, for the docs
 
 Processor time is that of all processes together; wall time depends on what else the machine does.
 """
@@ -314,7 +314,7 @@ def warm(side: int, robot: str = "ur5") -> None:
 
 
 def cost(count: int) -> None:
-    """What a plan costs beside its own time: the parent, keys, journals and tables."""
+    """What a plan costs besides its own time: the parent, keys, journals and tables."""
     study, folder = two_link_reaches(count), Path(tempfile.mkdtemp())
     began = time.process_time()
     for number in range(count):

@@ -1,4 +1,4 @@
-"""The suite of models/tasks: hovi at its default settings, and OMPL with TOPP-RA beside it.
+"""The suite of models/tasks: hovi at its default settings, and OMPL with TOPP-RA next to it.
 
     python tasks.py                     # all tasks
     python tasks.py bin panda           # those whose names contain one of these words

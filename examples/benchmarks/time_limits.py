@@ -1,8 +1,8 @@
 """Time limits on hostile scenes: how long `hovi plan` really takes under --time-limit.
 
-A duration in milliseconds, a million intervals, a million starts, tolerances that cannot be met:
+A duration in milliseconds, a million intervals, a million starts, tolerances out of reach:
 each scene is planned in a process of its own, with the certificate. Its time includes the start of
-the process, which is measured beside it.
+the process, which is measured next to it.
 """
 
 from __future__ import annotations

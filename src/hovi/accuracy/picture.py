@@ -184,7 +184,7 @@ def _least_errors(ax: Axes, diagram: Diagram, measure: str) -> None:
 
 
 def _label_tolerances(ax: Axes, chosen: Sequence[Choice], x: list[float], y: list[float]) -> None:
-    """Write the tolerance beside each star; stars of nearly equal error share one label."""
+    """Write the tolerance next to each star; stars of nearly equal error share one label."""
     groups: list[list[int]] = []
     for i, error in enumerate(y):
         if groups and abs(math.log10(error / y[groups[-1][0]])) < _COINCIDENT_DECADES:

@@ -39,8 +39,8 @@ class Choice:
 
     tolerance: relative, of the cost. scheme, intervals: of the final grid. cost: of the motion.
     estimate: estimated relative error of the cost. error: true errors, against the reference.
-    success: whether the tolerance is reported as met. repeats: time of each run, coarser grids and
-    error estimates included, in [s].
+    success: whether the tolerance is reported as reached. repeats: time of each run, with coarser
+    grids and error estimates, in [s].
     minimum: whether a minimum is reported. message: as reported.
     """
 

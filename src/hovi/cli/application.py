@@ -138,13 +138,13 @@ def _instead(error: TyperException) -> str:
 
 def _with_own_warnings(others: Callable[..., None]) -> Any:
     """How warnings are shown: those of hovi as a sentence, each once."""
-    told = set()
+    reported = set()
 
     def show(message: Warning | str, category: type[Warning], *where: Any) -> None:
         if not issubclass(category, HoviWarning):
             return others(message, category, *where)
-        if str(message) not in told:
-            told.add(str(message))
+        if str(message) not in reported:
+            reported.add(str(message))
             with suppress(OSError):  # stderr may be closed
                 print(f"warning: {message}", file=sys.stderr)
 

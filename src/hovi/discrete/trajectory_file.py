@@ -308,9 +308,9 @@ def _check_expansion(
 
 def _encode_header(header: Mapping[str, Any], arrays: Mapping[str, Array]) -> npt.NDArray[np.uint8]:
     version = VERSION if _MESHES in header else _WITHOUT_MESHES
-    marked = {"format": FORMAT, "version": version, **header}
+    complete = {"format": FORMAT, "version": version, **header}
     try:
-        decoded = json.loads(json.dumps(marked, allow_nan=False))  # keys become strings
+        decoded = json.loads(json.dumps(complete, allow_nan=False))  # keys become strings
         decoded[_HASH] = _digest(decoded, arrays)
         text = json.dumps(decoded, sort_keys=True, separators=(",", ":"))
     except (TypeError, ValueError) as error:
@@ -363,7 +363,7 @@ def _decode_array(raw: bytes, dtype: np.dtype[Any], label: str) -> npt.NDArray[A
         raise TrajectoryFileError(f"{label}: shape {shape} does not fit its {len(data)} bytes.")
     try:
         return np.frombuffer(data, dtype).reshape(shape)
-    except (ValueError, OverflowError) as error:  # too many dimensions; a zero beside large sizes
+    except (ValueError, OverflowError) as error:  # too many dimensions; a zero next to large sizes
         raise TrajectoryFileError(f"{label}: no array has the shape {shape}.") from error
 
 

@@ -23,7 +23,7 @@ try:
     from hovi._native.symbolic import SymbolicModel, pinocchio_version
 except ImportError as error:
     raise BuildMismatchError(
-        f"hovi's compiled extension does not load beside pin {pin.__version__} and casadi "
+        f"hovi's compiled extension does not load with pin {pin.__version__} and casadi "
         f"{version('casadi')} ({error}): reinstall hovi so that it is compiled again."
     ) from error
 

@@ -1,7 +1,7 @@
 """Compiles CasADi functions to C libraries, cached in the user's own cache folder.
 
 The folder is `hovi/compiled` in $XDG_CACHE_HOME or ~/.cache. The name of a library is the SHA-256
-of its source and compiler, and its own SHA-256 is stored beside it and checked before it is loaded.
+of its source and compiler, and its own SHA-256 is stored next to it and checked before loading.
 No library is loaded from anywhere else, nor while another user could change the folder or one above
 it; this is checked immediately before a library is loaded, since it may take seconds to build.
 """

@@ -41,7 +41,7 @@ class ExactDiscreteLagrangian(IntervalLagrangian):
     lagrangian: L on T^(k)Q. h: in [s]. tolerance: of the ends, and of the regularized momenta (for
         k = 2 h p and p~ - h p), relative to the largest.
     It belongs to the solution that exists for small h. InputError is raised if h is beyond its
-    first conjugate point, or if the tolerance is not met.
+    first conjugate point, or if the tolerance is not reached.
     """
 
     lagrangian: Lagrangian

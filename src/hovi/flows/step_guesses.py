@@ -83,7 +83,7 @@ def joined_modes(k: int, pieces: list[Array]) -> Array:
 def hard_step(attempt: Attempt, h: float, x: Array, p: Array, t: float, first: Trial) -> Trial:
     """A step whose first trial found nothing, or a solution far from its guess.
 
-    The equations of a long step may have several solutions. Shorter steps tell which one follows
+    The equations of a long step may have several solutions. Shorter steps show which one follows
     the motion: a solution is taken that ends near where they end, or else the nearest one found
     from their curves and perturbed ones; farther than `FAR` it does not approximate the motion.
     x, p: batches of one, p of shape (1, k, n). Raises InputError with what was found instead.

@@ -86,7 +86,7 @@ class BoundedObjective(ABC, Generic[X]):
         """Add a change to the multipliers of equations; returns what it adds to the value at x."""
         return 0.0
 
-    def meets_equations(self, x: X) -> bool:
+    def satisfies_equations(self, x: X) -> bool:
         """Whether equations hold at x to their tolerance; true without any."""
         return True
 

@@ -87,7 +87,7 @@ MAX_FORCE = 1e12
 """Multiplier, relative to the mean density, above which the bounds are taken as impossible."""
 SHORT_LENGTH, NO_LENGTH = 1e-4, 1e-8
 """Length of a step, relative to a radius of at least 1, that is no progress where bounds are not
-met, and its length that is none anywhere."""
+satisfied, and its length that is none anywhere."""
 MAX_STALLED_STEPS = 12
 """Consecutive steps without progress after which the iteration ends as diverged."""
 MAX_UNMET = 4
@@ -309,7 +309,7 @@ class _Iteration(BoundedSteps[X]):
         small = max(step.remaining, step.decrease) <= enough
         if not (last and whole and small and step.trial.newton and self.ended.feasible):
             return False
-        self.unmet = 0 if self.objective.meets_equations(self.ended.x) else self.unmet + 1
+        self.unmet = 0 if self.objective.satisfies_equations(self.ended.x) else self.unmet + 1
         return self.unmet % MAX_UNMET == 0
 
     def _reduce_mu(self, step: BoundedStep) -> None:

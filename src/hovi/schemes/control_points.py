@@ -54,8 +54,8 @@ def control_rows(
     """
     parts = zip(left.tolist(), width.tolist(), strict=True)
     found = [_of_part(*part, k, inner_modes, derivative) for part in parts]
-    points, beside = (np.stack(each) for each in zip(*found, strict=True))
-    return points, beside
+    points, curve = (np.stack(each) for each in zip(*found, strict=True))
+    return points, curve
 
 
 @lru_cache(maxsize=MOST_PARTS)

@@ -16,7 +16,7 @@ from hovi.planning.task_file.reading import parsed, read_toml
 from hovi.planning.task_file.scene_cache import SceneCache
 from hovi.study.cells.cells import Cells
 from hovi.study.cells.extras import require_extra
-from hovi.study.running.progress import OnProgress, told
+from hovi.study.running.progress import OnProgress, run_reported
 from hovi.study.running.runner import StudyRun
 from hovi.study.running.work import Output, motion_from
 from hovi.study.storage.folder import About, used_alone
@@ -42,7 +42,7 @@ MAX_WORKERS = 1000
 class StudyReport:
     """What a run of a study has done.
 
-    folder: where the tables are, beside the given one if that held another study.
+    folder: where the tables are, next to the given one if that held another study.
     count: of all plans. done: of those that are done. new: of those that this run has done.
     failures: of those that this run has done, by status, such as {"infeasible": 3}.
     lost: reasons for which plans were given up in this run, as their workers died each time.
@@ -149,7 +149,7 @@ class Study:
         Rows have the order of the cells, so that plans.parquet has the same bytes whatever the
         workers, and however often it was interrupted. Ctrl-C ends the run, with what is done.
         folder: created if need be. One that holds the study of another scene, or of another
-            version of hovi, is left as it is: the new one goes to a folder beside it.
+            version of hovi, is left as it is: the new one goes to a folder next to it.
         workers: number of worker processes.
         scheduler: the address of a Dask scheduler, such as "tcp://127.0.0.1:8786", whose workers
             see the same files; or "local" for one on this machine with as many workers.
@@ -175,7 +175,7 @@ class Study:
         chosen = Path(folder).absolute()
         if not replace:
             chosen = _own_folder(chosen, about)
-        with used_alone(chosen), told(progress) as on_progress:
+        with used_alone(chosen), run_reported(progress) as on_progress:
             run = StudyRun(
                 *(self.cells, about, chosen, self.output, workers, scheduler, on_progress, replace)
             )
@@ -236,12 +236,12 @@ class Study:
 
 
 def _own_folder(folder: Path, about: About) -> Path:
-    """The folder, or one beside it that is named by the study, if it holds another one."""
+    """The folder, or one next to it that is named by the study, if it holds another one."""
     held = About.read(folder)
     if held is None or held.identity == about.identity:
         return folder
-    beside = folder.with_name(f"{folder.name}-{about.scene[:8]}")
-    held = About.read(beside)
+    neighbor = folder.with_name(f"{folder.name}-{about.scene[:8]}")
+    held = About.read(neighbor)
     if held is None or held.identity == about.identity:
-        return beside
+        return neighbor
     return folder.with_name(f"{folder.name}-{about.scene[:8]}-{about.version}")

@@ -23,7 +23,7 @@ Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
 
 AT_LIMIT_NOTE = "A yellow link: its joint is at a limit."
-_HIGHLIGHT_COLOR = np.array([1.0, 0.85, 0.0, 1.0])  # yellow: light beside blue, orange and grey
+_HIGHLIGHT_COLOR = np.array([1.0, 0.85, 0.0, 1.0])  # yellow: light next to blue, orange and grey
 _COPY_SUFFIX = " at its limit"
 _BRIDGED_FRAMES = 4
 """Gaps of at most twice this number of frames are closed."""

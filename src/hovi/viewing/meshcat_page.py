@@ -119,7 +119,7 @@ class Page:
     title: of the browser's window, and a line in the page's corner.
     note: a second line there, such as a sentence about meshes that were not found.
     cautions: lines there, of the motions, that films show too.
-    panel: what is shown beside the scene; empty at first.
+    panel: what is shown next to the scene; empty at first.
     """
 
     def __init__(self, title: str, note: str = "") -> None:

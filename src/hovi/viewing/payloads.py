@@ -23,7 +23,7 @@ Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
 
 _COLOR = np.array([0.0, 0.62, 0.45, 1.0])
-_DENSITY = 500.0  # [kg/m^3], of wood: large enough to be seen beside a hand
+_DENSITY = 500.0  # [kg/m^3], of wood: large enough to be seen next to a hand
 _Key = tuple[str, float, tuple[float, ...]]
 
 

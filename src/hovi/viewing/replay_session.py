@@ -70,7 +70,7 @@ class Replay:
     def play(self, *, speed: float = 1.0, loop: bool = False, rate: float = _FRAME_RATE) -> None:
         """Move the robot on the page in real time from here, by the monotonic clock.
 
-        The page can do so itself; here other code may run beside the motion.
+        The page can do so itself; here other code may run during the motion.
 
         speed: motion seconds per second. rate: frames per second.
         loop: play again and again until interrupted (Ctrl-C, or Jupyter's stop button).
@@ -257,7 +257,7 @@ def _fill(
     speed: float,
     loop: bool,
 ) -> Replay:
-    """Draw motions on a page, with all that is shown beside them."""
+    """Draw motions on a page, with all that is shown next to them."""
     robot = _robot(trajectory)
     warn_of_cautions(trajectory.metadata)
     others = [(each, _robot(each)) for each in compare]

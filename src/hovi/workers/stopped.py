@@ -1,4 +1,4 @@
-"""Processes that are stopped, as by SIGSTOP, and told apart from slow ones by their state."""
+"""Processes that are stopped, as by SIGSTOP, and distinguished from slow ones by their state."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Watch:
 
 
 def state_of(pid: int) -> str:
-    """The letter by which Linux tells the state of a process; "" where that is not known."""
+    """The letter by which Linux reports the state of a process; "" where that is not known."""
     try:
         return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
     except (OSError, IndexError):

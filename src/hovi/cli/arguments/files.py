@@ -44,7 +44,7 @@ def check_output(path: Path, *suffixes: str) -> Path:
     return path
 
 
-def beside(file: Path, suffix: str) -> Path:
+def next_to(file: Path, suffix: str) -> Path:
     """The path of a motion's file with another extension. Raises InputError if it has no name."""
     if not file.name:
         given = str(file) if file.parts else ""

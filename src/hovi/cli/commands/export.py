@@ -65,9 +65,9 @@ def _format(name: str | None, csv: bool, out: Path | None) -> ExportFormat:
 
 def _beside(file: Path, suffix: str) -> Path:
     """The file with another extension, and another name where it has that one itself."""
-    from hovi.cli.arguments.files import beside
+    from hovi.cli.arguments.files import next_to
 
-    other = beside(file, suffix)
+    other = next_to(file, suffix)
     return file.with_name(f"{file.stem}_samples{suffix}") if other == file else other
 
 

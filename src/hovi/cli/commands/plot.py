@@ -22,10 +22,10 @@ def plot(
     package_dir: PackageDirs = None,
 ) -> None:
     """Plot q, v and tau of a motion; for a planar two-link arm, its swept surface as well."""
-    from hovi.cli.arguments.files import beside, check_output, load_shown
+    from hovi.cli.arguments.files import check_output, load_shown, next_to
     from hovi.viewing.plotting import plot_all
 
-    target = out or beside(file, ".png")
+    target = out or next_to(file, ".png")
     if target.is_dir():
         target = target / f"{file.stem}.png"
     check_output(target, ".png", ".pdf", ".svg")

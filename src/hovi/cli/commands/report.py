@@ -19,9 +19,9 @@ def report(
     package_dir: PackageDirs = None,
 ) -> None:
     """Write replay, curves, certificate, effects and scene of a motion to one offline file."""
-    from hovi.cli.arguments.files import beside, check_output, load_shown
+    from hovi.cli.arguments.files import check_output, load_shown, next_to
     from hovi.viewing.documents.report import write_report
 
-    target = check_output(html or beside(file, ".html"), ".html")
+    target = check_output(html or next_to(file, ".html"), ".html")
     write_report(load_shown(file, package_dir), target)
     print(f"wrote {target}")

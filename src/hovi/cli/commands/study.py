@@ -63,7 +63,7 @@ def run(
     import dataclasses
     import sys
 
-    from hovi.cli.reports.study import Told, print_ending
+    from hovi.cli.reports.study import Reported, print_ending
     from hovi.planning.search.multistart import default_processes
     from hovi.study.study import Study
 
@@ -72,13 +72,13 @@ def run(
     chosen = dataclasses.replace(Study.read(study), **changes)
     if note := chosen.note:
         print(f"note: {note}", file=sys.stderr, flush=True)
-    with Told() as told:
+    with Reported() as reported:
         report = chosen.run(
             out,
             default_processes() if workers is None else workers,
             scheduler=scheduler,
             replace=replace,
-            progress=told.take,
+            progress=reported.take,
         )
     raise typer.Exit(print_ending(report, out))
 

@@ -75,7 +75,7 @@ class KnownMargins:
 
 
 def is_guess(solution: Solution) -> bool:
-    """Whether the motion is but a guess, as nothing had to be solved to tell that there is none."""
+    """Whether the motion is but a guess, as nothing had to be solved to know that there is none."""
     return solution.status is Status.INFEASIBLE and solution.nit == 0
 
 

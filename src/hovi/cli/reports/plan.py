@@ -223,7 +223,7 @@ def _margins_note(margins: LimitMargins) -> str:
 
 
 def _print_peaks(extremes: Peaks) -> None:
-    """Print the extremes of each joint beside the limits of the URDF."""
+    """Print the extremes of each joint next to the limits of the URDF."""
     beyond = {
         key: ["!" if each else "" for each in flags] for key, flags in extremes.beyond().items()
     }

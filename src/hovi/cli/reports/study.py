@@ -1,4 +1,4 @@
-"""What a running study tells on stderr, and how it ended."""
+"""What a running study reports on stderr, and how it ended."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ WIDTH = 150
 """Characters of a failure's reason that are printed; the table has all of them."""
 
 
-class Told:
+class Reported:
     """A progress bar with rates and the time left, and a line for each failure."""
 
     def __init__(self) -> None:

@@ -70,7 +70,7 @@ def extremes(trajectory: Trajectory) -> Extremes:
     The curve of a scheme of order k has k - 1 continuous derivatives. For k = 2, as for the effort,
     the jerk is that of each interval: at a node the larger one of its two limits counts. A jump of
     the acceleration itself, as from rest at both ends, is no jerk; the accelerations at the ends
-    tell its size. For k = 3 accelerations are continuous and the jerk may jump.
+    show its size. For k = 3 accelerations are continuous and the jerk may jump.
     """
     series, units = _accelerations(trajectory), _units(trajectory)
     return Extremes(

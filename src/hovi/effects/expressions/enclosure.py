@@ -80,7 +80,7 @@ class Enclosure:
         change: largest change of an argument of a function that counts as calm, absolute for exp
             or sin, relative for 1/x, logarithms and powers.
         peaks: largest absolute value of each instruction, shape (size,), updated in place: what is
-            negligible beside it is calm.
+            negligible compared with it is calm.
         """
         P = len(boxes[0][0])
         run = Run(np.ones(P, dtype=bool), np.zeros(P, dtype=bool), change)

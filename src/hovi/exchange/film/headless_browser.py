@@ -163,7 +163,7 @@ def _started(command: list[str]) -> Iterator[_Connection]:
             closing.callback(_end, _spawned(command, reads, writes))
         except OSError as refused:
             raise BrowserError(f"Chromium does not start: {reason(refused)}") from None
-        finally:  # so that the other ends tell when the browser is gone
+        finally:  # so that the other ends notice when the browser is gone
             os.close(reads)
             os.close(writes)
         yield _Connection(commands, answers)

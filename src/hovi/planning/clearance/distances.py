@@ -222,7 +222,7 @@ def _paths(clearance: Clearance) -> list[ObstaclePath]:
 def marked_as_touching(
     pairs: Sequence[Pair], may_touch: Sequence[tuple[str, str]], names: Sequence[str]
 ) -> list[Pair]:
-    """The pairs, with those that may touch marked.
+    """The pairs, with those that may touch flagged.
 
     names: of all links and obstacles. Raises InputError for another name.
     """

@@ -84,7 +84,7 @@ def first_guesses(
     """
     try:
         depth = depth_of(problem, direct)
-    except OutOfTimeError:  # which the solve from it tells
+    except OutOfTimeError:  # which the solve from it reports
         return FirstGuesses(direct)
     if depth < DEEP or not has_ompl():
         return FirstGuesses(direct, depth)

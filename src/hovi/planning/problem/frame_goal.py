@@ -142,7 +142,7 @@ class FrameGoal:
         robot.check_frame_moves(self.frame)
 
     def difference(self, robot: Robot) -> PoseDifference:
-        """The goal as a function c(q) that vanishes where it is met."""
+        """The goal as a function c(q) that vanishes where it is reached."""
         self.check(robot)
         return PoseDifference(self, robot)
 

@@ -29,7 +29,7 @@ from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 
-MET = 1e-6
+SATISFIED = 1e-6
 """Largest distance, in [m], and angle, in [rad], between a goal and a frame that satisfies it."""
 FULL_RANK = 1e-6
 """Least singular value of a goal's Jacobian at an isolated configuration, relative to its norm."""
@@ -76,7 +76,7 @@ def _is_given(value: object) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class GoalState:
-    """A state that meets a goal, what vanishes where it is met, and why it cannot be, or ""."""
+    """A state that reaches a goal, what vanishes there, and why it cannot be reached, or ""."""
 
     state: State
     differences: tuple[Function, ...] = ()
@@ -122,7 +122,7 @@ def held_goal(goal: FrameGoal, robot: Robot, q: Array, free: Sequence[str] = ())
 
     free: joints that are free in it if they do not move the frame.
     """
-    if max(goal.miss(robot, q)) > MET:
+    if max(goal.miss(robot, q)) > SATISFIED:
         return None
     moves = moves_frame(robot.model, goal.frame)
     left = tuple(each for each in free if each == ALL or not moves[robot.entries_of(each)].any())
@@ -146,7 +146,7 @@ def _moving_joints(robot: Robot, frame: str, free: tuple[str, ...]) -> tuple[str
 
 
 def via_differences(via: Via, reached: GoalState, coordinates: Coordinates) -> tuple[Function, ...]:
-    """What vanishes at a via point. reached: a state that meets its goal."""
+    """What vanishes at a via point. reached: a state that reaches its goal."""
     if reached.differences:
         return reached.differences
     q, v = reached.state.on(coordinates, "via")

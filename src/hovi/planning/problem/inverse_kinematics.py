@@ -44,7 +44,7 @@ SEARCHED = 4
 class InverseKinematicsResult:
     """A configuration, and its error in words.
 
-    q: shape (nq,). reason: by how much q misses the goal; "" if it meets it.
+    q: shape (nq,). reason: by how much q misses the goal; "" if it reaches it.
     """
 
     q: Array
@@ -66,14 +66,14 @@ def inverse_kinematics(
 ) -> Array:
     """Distinct configurations in which a frame reaches its goal, best first, shape (K, nq), K >= 1.
 
-    The best is the one nearest to `near` in |q (-) near|. The goal is met to 1e-9 m and 1e-9 rad. A
+    The best is the one nearest to `near` in |q (-) near|. Goals hold to 1e-9 m and 1e-9 rad. A
     revolute joint with a range of more than a turn is given at the turn nearest to `near`;
     configurations that differ by full turns count as one. Where the joints are more than the
     equations of the goal, configurations form families, of which some members are returned that
     differ by at least 0.3 rad or m in a joint. Joints that do not move the frame keep the values of
     `near`.
 
-    goal: what the frame has to meet: a FrameGoal, or a table such as {"frame": "tool0",
+    goal: what the frame has to reach: a FrameGoal, or a table such as {"frame": "tool0",
         "position": [0.4, 0.2, 0.3]}.
     near: a configuration (nq,), the name of a pose or a table of joints, from which the search
         begins; by default the goal's guess, or the middle of the joints' ranges, 0 for joints
@@ -125,7 +125,7 @@ def configurations(
 def nearest_configuration(
     robot: Robot, goal: FrameGoal, near: Array, bounds: Bounds
 ) -> InverseKinematicsResult:
-    """The nearest of the configurations found that meet a goal, or the best one if none does.
+    """The nearest of the configurations found that reach a goal, or the best one if none does.
 
     near: the first seed, to which distances are measured, shape (nq,). bounds: as position_bounds.
     """

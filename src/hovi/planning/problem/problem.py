@@ -75,7 +75,7 @@ class TrajectoryProblem(ProblemSummary):
     free_ends: which of (q, q', ..., q^(k-1)) are free at the start and at the goal, shape
         (2, k, nv).
     equations: at nodes. holds: what is fixed where segments meet.
-    unreachable: why the goal cannot be met, or "".
+    unreachable: why the goal cannot be reached, or "".
     turns: full turns of the guess beyond the shortest path, rotation vectors over 2 pi, (nv,).
     Raises InputError, ModelError or SchemeError if the input defines no problem.
     """

@@ -55,7 +55,7 @@ class ViaPoints:
     """What the via points of a problem ask for.
 
     equations: at nodes. holds: of seams, by ascending time. reason: why one of them
-    cannot be met, or "".
+    cannot be reached, or "".
     """
 
     equations: tuple[Equation, ...]

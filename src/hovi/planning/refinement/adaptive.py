@@ -1,4 +1,4 @@
-"""Adaptive solve to a tolerance: estimate the error and refine the grid until it is met."""
+"""Adaptive solve to a tolerance: estimate the error and refine the grid until it is reached."""
 
 from __future__ import annotations
 

@@ -31,7 +31,7 @@ from hovi.planning.refinement.nearby_minimum import nearby_minimum
 from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.central_path import CentralPath
 from hovi.planning.solver.outcome.cost_with_time import cost_of, price_of_time
-from hovi.planning.solver.receding.last_motion import meets
+from hovi.planning.solver.receding.last_motion import satisfies
 from hovi.planning.solver.solver import Solution, solve_on_grid
 from hovi.robot.space.coordinates import Coordinates
 from hovi.system.dataclass import dataclass
@@ -225,7 +225,9 @@ def _finished(found: FinerSolution, barrier: float) -> Solution | None:
     known = found.finish()
     if known is None or known.central is None or known.problem is None:
         return None
-    if known.central.level <= SAME_LEVEL * barrier and meets(known.problem, known.trajectory.path):
+    if known.central.level <= SAME_LEVEL * barrier and satisfies(
+        known.problem, known.trajectory.path
+    ):
         return dataclasses.replace(known, central=known.central.freed())
     start = Start(known.trajectory.path, known.central.freed(), near=True)
     solution = solve_on_grid(known.problem, start, barrier=barrier)

@@ -41,7 +41,7 @@ MORE_POINTS = 4
 """Quadrature points of an interval beyond r + k while the motion is not resolved, so that the
 torque cannot vanish at the points alone."""
 INFEASIBLE_PIECES = 1000
-"""Number of pieces that marks a number of modes with which the demands cannot be met."""
+"""Number of pieces that stands for a number of modes with which the demands cannot be satisfied."""
 SPLIT_COST = 900.0
 """Fixed cost of interpolating the motion at new nodes, in points for one joint."""
 
@@ -61,8 +61,8 @@ class Demand:
     def remaining(self, change: Array | float) -> float:
         """Ratio of predicted and demanded error once the acceleration's error changes by `change`.
 
-        At most 1 if the demand is met: the mean over the intervals for the cost, the maximum for
-        the curve.
+        At most 1 if the demand is satisfied: the mean over the intervals for the cost, the maximum
+        for the curve.
         """
         ratio = change**self.power / self.factor
         return float(np.mean(ratio) if self.power == 2 else np.max(ratio))
@@ -129,16 +129,16 @@ def galerkin_with_more_points(inner_modes: int, k: int = 2) -> Scheme:
 def _pieces(current: Index, more: Index, rho: Array, demands: Sequence[Demand], k: int) -> Index:
     """Pieces into which each interval is split with each number of modes, shape (N, D).
 
-    INFEASIBLE_PIECES where no number of pieces meets the demands but another number of modes does.
+    INFEASIBLE_PIECES where only another number of modes satisfies the demands.
     """
     after = (more[:, :, None] + k) * np.log(_decay_of_pieces(rho))[:, None]  # (N, D, S)
     change = after - ((current + k) * np.log(rho))[:, None, None]
-    meets: Mask = np.ones(change.shape, dtype=bool)
+    satisfied: Mask = np.ones(change.shape, dtype=bool)
     for demand in demands:
         wanted = np.log(np.minimum(demand.factor, 1.0))
-        meets &= demand.power * change <= wanted[:, None, None] + 1e-12
-    possible: Mask = np.any(meets, axis=2)
-    pieces = np.where(possible, PIECES[np.argmax(meets, axis=2)], INFEASIBLE_PIECES)
+        satisfied &= demand.power * change <= wanted[:, None, None] + 1e-12
+    possible: Mask = np.any(satisfied, axis=2)
+    pieces = np.where(possible, PIECES[np.argmax(satisfied, axis=2)], INFEASIBLE_PIECES)
     infeasible = ~possible.any(axis=1)
     pieces[infeasible] = PIECES[-1]
     return pieces
@@ -162,7 +162,7 @@ def _cheapest(more: Index, pieces: Index, fraction: float, k: int) -> tuple[int,
 def _decay_of_pieces(rho: Array) -> Array:
     """rho after splitting into PIECES, shape (N, S).
 
-    For a singularity beside the middle of the interval, at a distance of y half lengths,
+    For a singularity next to the middle of the interval, at a distance of y half lengths,
     1/rho = y + sqrt(1 + y^2); splitting into s pieces changes y to s y.
     """
     y = 0.5 * (1 / rho - rho)[:, None] * PIECES

@@ -122,7 +122,7 @@ def chosen_ends(
 
     A start is the branch itself; of a goal it is the guess of inverse kinematics, if it has none.
     duration: in [s]. options: resolved for the scene's robot. deadline: of the whole plan.
-    Raises UnreachableError for a start that cannot be met; a goal then stays as it is.
+    Raises UnreachableError for a start that cannot be reached; a goal then stays as it is.
     """
     if isinstance(start, State) and _is_one(goal):
         return Ends(start, goal)
@@ -365,7 +365,7 @@ class _Choice:
 
 
 def _is_one(end: State | FrameGoal) -> bool:
-    """Whether an end is met in a single configuration, the given one."""
+    """Whether an end is reached in a single configuration, the given one."""
     return isinstance(end, State) or end.guess is not None
 
 

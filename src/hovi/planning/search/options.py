@@ -117,7 +117,7 @@ class PlanOptions:
     strict: bool = option(
         False,
         "whether a start outside its limits, or that cannot but leave them, is refused; otherwise "
-        "it is led back from up to 2 % beyond, which the solution's `excused` tells.",
+        "it is led back from up to 2 % beyond, which the solution's `excused` reports.",
         SceneKey("true or false"),
     )
     starts: int = whole_number(

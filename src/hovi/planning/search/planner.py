@@ -102,9 +102,9 @@ def plan(
 ) -> Solution:
     """The motion of least 1/2 integral |tau|^2 from a state to a goal.
 
-    Where a FrameGoal is met in several configurations, coarse motions to the nearest ones are
+    Where a FrameGoal is reached in several configurations, coarse motions to the nearest ones are
     compared, and the one that costs least is chosen: a start is that configuration, a goal begins
-    there and is free to change along all configurations that meet it.
+    there and is free to change along all configurations that reach it.
 
     scene: the robot with its effects.
     start, goal: a State, a configuration of shape (nq,) at rest, the name of a pose, or a
@@ -117,7 +117,7 @@ def plan(
     options: a PlanOptions; the following keywords override it.
     {options}
     Raises InputError, ModelError, SceneError or SchemeError for invalid input, UnreachableError for
-    a start that no configuration meets.
+    a start that no configuration reaches.
     """
     began = time.perf_counter()
     if not isinstance(scene, Scene):

@@ -1,4 +1,4 @@
-"""Which configurations the frame goals of a sequence are met in: the cheapest way through them all.
+"""Which configurations reach the frame goals of a sequence: the cheapest way through them all.
 
 Every goal of a frame has several branches of inverse kinematics, and the choice of one goal's
 branch changes what the next one costs. The branches are a graph in layers, whose edges cost what
@@ -51,7 +51,7 @@ class MoveToGoal:
 class _Layer:
     """The branches of a goal: q of shape (K, nq), and the one chosen before each, (K,).
 
-    known: whether they meet the goal, or stand for one that cannot be met.
+    known: whether they reach the goal, or stand for one that cannot be reached.
     """
 
     q: Array
@@ -67,11 +67,11 @@ def chosen_branches(
     moves: Sequence[MoveToGoal],
     clearance: Clearance,
 ) -> tuple[State, list[End]]:
-    """The start as a state, and the goals with the branch in which each is met as their guess.
+    """The start as a state, and the goals with the branch in which each is reached as their guess.
 
     lagrangian: of the whole sequence, for joints with nq = nv. start: whose goal the start is.
-    Goals that cannot be met stay as they are.
-    Raises UnreachableError for a start that cannot be met.
+    Goals that cannot be reached stay as they are.
+    Raises UnreachableError for a start that cannot be reached.
     """
     for each in (start, *moves):
         if isinstance(each.goal, FrameGoal):

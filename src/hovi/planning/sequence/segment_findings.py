@@ -54,7 +54,7 @@ def _alone(job: Job, move: MoveToGoal, start: State, limits: Limits) -> Trajecto
 def _as_start(goal: End) -> State | None:
     """The goal of a segment as the start of the next one, free where the target of a frame is.
 
-    None where no configuration meets it.
+    None where no configuration reaches it.
     """
     if isinstance(goal, State):
         return goal

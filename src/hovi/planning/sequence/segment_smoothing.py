@@ -58,8 +58,8 @@ def smoothed_durations(durations: Sequence[float], still: Sequence[bool]) -> lis
     moving = np.flatnonzero(~np.asarray(still))
     found = T.copy()
     for i in np.flatnonzero(still):
-        beside = [*moving[moving < i][-1:], *moving[moving > i][:1]]
-        found[i] = max(T[i], *T[beside]) if beside else T[i]
+        neighbors = [*moving[moving < i][-1:], *moving[moving > i][:1]]
+        found[i] = max(T[i], *T[neighbors]) if neighbors else T[i]
     return [float(each) for each in found]
 
 

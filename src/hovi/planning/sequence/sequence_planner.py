@@ -102,7 +102,7 @@ def plan_sequence(
         segments together, and the times of `via` count from the start of the first.
     {options}
     Raises InputError, ModelError, SceneError or SchemeError for invalid input, UnreachableError for
-    a start that no configuration meets.
+    a start that no configuration reaches.
     """
     began = time.perf_counter()
     if not isinstance(scene, Scene):

@@ -74,8 +74,8 @@ def minimize_constrained(
         if result.why is not Reason.STATIONARY or are_met(residuals):
             break
         slow = [
-            size > max(SLOW_DECREASE * before, 0.1 * met)
-            for size, before, met in zip(
+            size > max(SLOW_DECREASE * before, 0.1 * enough)
+            for size, before, enough in zip(
                 sizes, last, (TORQUE_TOLERANCE, NODE_TOLERANCE), strict=True
             )
         ]

@@ -293,7 +293,7 @@ class BoundedAction(BoundedObjective[DiscretePath]):
         """See BoundedObjective.hold: of conditions at nodes."""
         return self.action.hold(x, change)
 
-    def meets_equations(self, x: DiscretePath) -> bool:
+    def satisfies_equations(self, x: DiscretePath) -> bool:
         """Whether conditions at nodes hold to their tolerance."""
         if self.node_tolerance is None:
             return True

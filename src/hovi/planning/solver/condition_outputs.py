@@ -2,7 +2,7 @@
 
 With x = (q, v, a), J = d tau / dx and y = y(x, tau, t) the chain rule gives dy = y_x + y_tau J, and
 for weights w of the outputs the second derivatives w y_xx + S + S^T + J^T (w y_tautau) J with
-S = (w y_xtau) J, beside those of tau with the weights w y_tau, which are the torque model's.
+S = (w y_xtau) J, next to those of tau with the weights w y_tau, which are the torque model's.
 """
 
 from __future__ import annotations

@@ -49,8 +49,8 @@ from hovi.planning.solver.receding.ends import (
 )
 from hovi.planning.solver.receding.last_motion import (
     last_motion,
-    meets,
     out_of_time,
+    satisfies,
 )
 from hovi.planning.solver.requirements.ends import starts_there
 from hovi.planning.solver.status import Status, unfinished
@@ -157,7 +157,7 @@ class Solution(SolutionSummary):
             where one is found: its goal is where it stops.
         strict: whether a start outside its limits is refused; as planned if None.
         options: as for `solve`. Self-collision that was left out is not looked for, as `plan` does.
-        Raises InputError without a problem, UnreachableError for a start that nothing meets.
+        Raises InputError without a problem, UnreachableError for a start that nothing reaches.
         """
         deadline = Deadline(as_time_limit(time_limit))
         require_known(options, Solution.replan, solve_on_grid)
@@ -274,7 +274,7 @@ class _Again:
                         return done
                     return self._at_rest(done.status, done.message, done.nit) or done
                 solved = found.problem or self.problem
-                if np.isfinite(found.cost) and meets(solved, found.trajectory.path):
+                if np.isfinite(found.cost) and satisfies(solved, found.trajectory.path):
                     return self._kept(found)
             except OutOfTimeError:
                 pass

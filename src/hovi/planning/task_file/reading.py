@@ -113,7 +113,7 @@ def _options(
     robot: with what it holds.
     """
     plain = {name: getattr(table, name) for name in PLAIN}
-    if meets(table):
+    if may_touch(table):
         plain["self_collision"] = False
     try:
         options = PlanOptions(**plain, grasped=grasped)
@@ -135,7 +135,7 @@ def _options(
     )
 
 
-def meets(table: ShapedTable) -> bool:
+def may_touch(table: ShapedTable) -> bool:
     """Whether links of a file may meet since it is of format 1 and says nothing of it."""
     return table.format == 1 and getattr(table, "self_collision", None) is None
 
@@ -144,7 +144,7 @@ def _note(table: ShapedTable, robot: Robot, toml: TomlText) -> str:
     """What is assumed of a file of format 1 whose robot has collision shapes; "" for others."""
     from hovi.planning.clearance.self_collisions import can_keep_apart, names_shapes  # 10 ms
 
-    if not (meets(table) and names_shapes(robot) and can_keep_apart(robot)):
+    if not (may_touch(table) and names_shapes(robot) and can_keep_apart(robot)):
         return ""
     return (
         f"{toml.path.name} has no `format`, so links may meet, as in format 1: write `format = "

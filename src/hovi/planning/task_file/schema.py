@@ -335,7 +335,7 @@ _KINDS: dict[str, Any] = {
     "guess": str,
     "self_collision": bool | None,
 }
-"""Types of options that the type of their default does not tell."""
+"""Types of options that the type of their default does not say."""
 
 
 def _plain_field(name: str) -> tuple[Any, Any]:

@@ -37,7 +37,7 @@ def save_task(task: Task, path: str | Path) -> Path:
     """Write a task as TOML; returns the path.
 
     path: the file, which is replaced atomically; its folder is created. The URDF and the SRDF of
-        a robot that was loaded from files are written beside it unless they exist.
+        a robot that was loaded from files are written next to it unless they exist.
     Raises SceneError if the robot has no file, if a different file of that name exists, or for an
     option that scene files have no key for.
     """

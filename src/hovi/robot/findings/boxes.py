@@ -1,4 +1,4 @@
-"""The shapes of a URDF by their bounding boxes, which tell sizes without a mesh library."""
+"""The shapes of a URDF by their bounding boxes, which give sizes without a mesh library."""
 
 from __future__ import annotations
 

@@ -53,7 +53,7 @@ def require_untrusted(robot: str | Path) -> None:
 
 
 def _head(path: Path) -> bytes:
-    with suppress(OSError, ValueError):  # told by who reads it
+    with suppress(OSError, ValueError):  # reported by who reads it
         require_file(path, _MAX_BYTES)
         with path.open("rb") as stream:
             return re.sub(rb"<!--.*?-->", b"", stream.read(_HEAD), flags=re.DOTALL)

@@ -34,7 +34,7 @@ def urdf_of_xacro(
     """
     try:
         import xacro
-        from xacrodoc import packages  # which tells xacro where packages are, without ROS
+        from xacrodoc import packages  # which says to xacro where packages are, without ROS
     except ImportError:
         raise ModelError(
             f"{path.name!r} is a xacro file, which needs xacrodoc: run pip install 'hovi[robots]'."
@@ -49,7 +49,7 @@ def urdf_of_xacro(
     packages.update_package_cache(known)
     xacro.all_includes.clear()
     try:
-        with contextlib.redirect_stderr(io.StringIO()):  # what xacro prints beside its error
+        with contextlib.redirect_stderr(io.StringIO()):  # what xacro prints next to its error
             text = xacro.process_file(str(path), mappings=dict(arguments)).toprettyxml(indent="  ")
     except Exception as error:  # whatever the expressions of the file raise
         raise ModelError(_sentence(path, error, xacro)) from error

@@ -43,7 +43,7 @@ def _name(robot: Element, stem: str) -> Iterator[tuple[str, str]]:
 def _definitions(robot: Element, _: str) -> Iterator[tuple[str, str]]:
     """Definitions of xacro that nothing refers to are none."""
     values = [x for each in robot.iter() if XACRO not in each.tag for x in each.attrib.values()]
-    if any(mark in value for value in values for mark in _INSERTED):
+    if any(each in value for value in values for each in _INSERTED):
         return
     for parent in list(robot.iter()):
         for child in [each for each in parent if each.tag in DEFINITIONS]:

@@ -1,4 +1,4 @@
-"""The tables [[vary]] of a study file: one axis each, of the kind that its keys tell."""
+"""The tables [[vary]] of a study file: one axis each, of the kind that its keys say."""
 
 from __future__ import annotations
 

@@ -28,7 +28,7 @@ def poses(
 
     fields: one, "start" or "goal". points: in the world, shape (M, 3), in [m].
     orientation: what else the target has: rpy, axis or a quaternion as in a scene file.
-    by_kinematics: whether the target is replaced by the nearest configuration that meets it, so
+    by_kinematics: whether the target is replaced by the nearest configuration that reaches it, so
         that one motion is planned; else the plan compares those to several configurations.
     """
     if len(fields) != 1 or fields[0].text not in ENDS:

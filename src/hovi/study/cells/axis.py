@@ -26,7 +26,7 @@ class Axis:
     fields: of which no one is part of another.
     values: what each step puts into them, one entry for each field.
     uniform: whether all values have the form of the first one, as samples have.
-    ends: "start" or "goal", where a frame's target is replaced by a configuration that meets it.
+    ends: "start" or "goal", where a frame's target is replaced by a configuration that reaches it.
     """
 
     fields: tuple[FieldPath, ...]

@@ -77,8 +77,8 @@ OnProgress = Callable[[StudyProgress], None]
 
 
 @contextmanager
-def told(given: OnProgress | None) -> Iterator[OnProgress]:
-    """Whom a run tells its state: what was given, else a line in a notebook, else nobody."""
+def run_reported(given: OnProgress | None) -> Iterator[OnProgress]:
+    """Who a run's state is reported to: what was given, else a line in a notebook, else nobody."""
     if given is not None:
         yield given
         return

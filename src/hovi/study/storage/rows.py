@@ -8,7 +8,7 @@ from typing import Any, Self
 from hovi.system.dataclass import dataclass
 
 REFUSED, UNREACHABLE, FAILED = "refused", "unreachable", "failed"
-"""What became of a cell that was not planned: its scene is invalid, no configuration meets its
+"""What became of a cell that was not planned: its scene is invalid, no configuration reaches its
 goal, or an error that hovi does not raise on purpose."""
 
 

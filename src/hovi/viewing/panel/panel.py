@@ -1,4 +1,4 @@
-"""The numbers that a replay page shows beside its scene, as JSON.
+"""The numbers that a replay page shows next to its scene, as JSON.
 
 Curves of all coordinates over time, their limits, and where joints are; times in [s], positions in
 [m], angles in [rad].
@@ -198,7 +198,7 @@ def _rounded(values: Array) -> Any:
 
 
 def labels_of(trajectories: Sequence[Trajectory]) -> tuple[str, ...]:
-    """A short name for each of several motions: what tells them apart."""
+    """A short name for each of several motions: what distinguishes them."""
     shown = []
     for k, each in enumerate(trajectories):
         data = each.metadata

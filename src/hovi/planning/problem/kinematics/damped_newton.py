@@ -35,7 +35,7 @@ MAX_STALLED_STEPS = 8
 def candidates(
     robot: Robot, goal: FrameGoal, near: Array, lower: Array, upper: Array
 ) -> Iterator[Array]:
-    """Where the search from each seed ends: configurations (nq,), whether or not they meet a goal.
+    """Where the search from each seed ends: configurations (nq,), whether or not they reach a goal.
 
     near: the first seed, shape (nq,).
     lower, upper: position limits, shape (nv,), applied to joints whose q is a plain number.

@@ -201,7 +201,7 @@ class _FrameMove(Move):
             return None  # out of reach, whatever the time
         away = robot.difference(q, found) * (1 if self.known is self.first else -1)
         longest = float(self.pace.least_time(away, self.rests).max(axis=1).min())
-        if longest <= self.time or self._meets(goal, q, self.time):
+        if longest <= self.time or self._reaches(goal, q, self.time):
             return None
         needed = self._least_found(goal, q, longest)
         limits = "velocity and acceleration limits" if self._accelerated else "velocity limits"
@@ -218,7 +218,7 @@ class _FrameMove(Move):
         """Whether limits on the acceleration count."""
         return bool((self.limits.bounded[2] & (self.rests > 0)).any())
 
-    def _meets(self, goal: FrameGoal, q: Array, time: float) -> bool:
+    def _reaches(self, goal: FrameGoal, q: Array, time: float) -> bool:
         """Whether a configuration at the goal is found that the joints reach in a time."""
         bounds = self._box(q, time)
         return len(find_branches(self.coordinates, goal, q, bounds, 1, SEEDS).q) > 0
@@ -228,8 +228,8 @@ class _FrameMove(Move):
         least = self.time
         for _ in range(BISECTIONS):
             middle = (least + longest) / 2
-            meets = self._meets(goal, q, middle)
-            least, longest = (least, middle) if meets else (middle, longest)
+            reaches = self._reaches(goal, q, middle)
+            least, longest = (least, middle) if reaches else (middle, longest)
         return longest
 
     def _proven(self, goal: FrameGoal, q: Array) -> bool:

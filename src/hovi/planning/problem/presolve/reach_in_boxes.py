@@ -29,7 +29,7 @@ ROUNDING = 1e-6
 
 
 def proven_out_of_reach(chain: KinematicChain, goal: FrameGoal, lower: Array, upper: Array) -> bool:
-    """Whether no configuration with the chain's joints in a box meets the goal.
+    """Whether no configuration with the chain's joints in a box reaches the goal.
 
     lower, upper: of the box, shape (n,), in [rad] or [m]. False where no proof was found.
     """
@@ -52,7 +52,7 @@ def proven_out_of_reach(chain: KinematicChain, goal: FrameGoal, lower: Array, up
 def _undecided(
     chain: KinematicChain, goal: FrameGoal, centers: Array, widths: Array
 ) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.intp]]:
-    """Which boxes (M, n) may meet the goal, and where these are halved."""
+    """Which boxes (M, n) may reach the goal, and where these are halved."""
     origin, rotation, arms = _placed(chain, centers)
     turns = np.where(chain.angular != 0, widths, 0.0)
     moves = 2 * arms * np.sin(np.minimum(turns, np.pi) / 2) + np.abs(chain.linear) * widths

@@ -257,7 +257,7 @@ class LimitRows:
         scale = 1.0 / (ranges * self.grid.steps[self.intervals] ** self.orders)[:, None]
         base = np.where(self.orders == 0, 1.0 / ranges, 0.0)[:, None]
         self._regular = np.concatenate([base, rows.table * scale], axis=1)
-        self._beyond = (rows.table - rows.beside) * scale
+        self._beyond = (rows.table - rows.curve) * scale
 
     def _wider(self, excused: Excused) -> tuple[Index, Array]:
         """The rows of what is excused, and by how much their bounds are wider."""
@@ -288,8 +288,8 @@ class LimitRows:
             left, width, which = parts.at(own).unique
             tables = control_rows(left, width, self.grid.order, self.grid.inner_modes, int(order))
             part, i = np.nonzero(self._needed(parts.at(own), int(order)))
-            table, beside = (each[which[part], i] for each in tables)
-            found.append(_Rows(own[part], i, table, beside))
+            table, curve = (each[which[part], i] for each in tables)
+            found.append(_Rows(own[part], i, table, curve))
         return _Rows(*(np.concatenate(each) for each in zip(*found, strict=True)))
 
     def _needed(self, parts: LimitedParts, order: int) -> Mask:
@@ -346,18 +346,18 @@ class _Rows(NamedTuple):
     """Rows of control points.
 
     part: number of their parts, (E,). number: of the control point in the part, (E,).
-    table, beside: of the control points, and of the curve at the same places, (E, 2 k - 1 + r).
+    table, curve: of the control points, and of the curve at the same places, (E, 2 k - 1 + r).
     """
 
     part: Index
     number: Index
     table: Array
-    beside: Array
+    curve: Array
 
     def at(self, chosen: Index) -> _Rows:
         """Some of them."""
-        table, beside = self.table[chosen], self.beside[chosen]
-        return _Rows(self.part[chosen], self.number[chosen], table, beside)
+        table, curve = self.table[chosen], self.curve[chosen]
+        return _Rows(self.part[chosen], self.number[chosen], table, curve)
 
 
 def push_rows(rows: LimitRows, columns: Array, step: Array) -> Array:

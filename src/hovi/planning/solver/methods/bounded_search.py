@@ -144,7 +144,7 @@ class BoundedSearch:
 
     @property
     def more(self) -> PointOutputs | None:
-        """What is bounded at the points beside limits: distances, and then conditions."""
+        """What is bounded at the points next to limits: distances, and then conditions."""
         conditions = ConditionOutputs(self.problem) if self.problem.bounds else None
         return joint_outputs(self.clearance, conditions)
 
@@ -294,8 +294,8 @@ class BoundedSearch:
         known = self.multipliers or first_multipliers(self.problem, start.x)
         objective = self.objective(known, node_tolerance=NODE_TOLERANCE)
         ended = self.minimized(objective, start, self.remaining_criteria())
-        met = objective.meets_equations(ended.x)
-        if ended.why is Reason.DIVERGED or (ended.why is Reason.STATIONARY and not met):
+        satisfied = objective.satisfies_equations(ended.x)
+        if ended.why is Reason.DIVERGED or (ended.why is Reason.STATIONARY and not satisfied):
             return None
         self.multipliers = objective.action.multipliers
         spurious = ended.why is Reason.STATIONARY

@@ -168,8 +168,8 @@ class _Search:
         known = objective.multipliers(found.z)
         residuals = objective.action.residuals(x)
         cost = found.value + price_of_time(problem)
-        met = within(residuals, FEASIBLE_RESIDUAL, FEASIBLE_RESIDUAL)
-        done = found.why is Reason.STATIONARY or (found.why is Reason.ITERATION_LIMIT and met)
+        satisfied = within(residuals, FEASIBLE_RESIDUAL, FEASIBLE_RESIDUAL)
+        done = found.why is Reason.STATIONARY or (found.why is Reason.ITERATION_LIMIT and satisfied)
         reason = spurious_sentence(problem, x) if done else ""
         if found.why is Reason.INFEASIBLE:
             reason = unmet_sentence(problem, x, residuals)

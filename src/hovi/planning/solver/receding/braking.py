@@ -20,7 +20,7 @@ from hovi.discrete.grid import DiscretePath
 from hovi.discrete.guess import Curve
 from hovi.discrete.state import State
 from hovi.planning.problem.problem import TrajectoryProblem
-from hovi.planning.solver.receding.last_motion import meets
+from hovi.planning.solver.receding.last_motion import satisfies
 
 Array = npt.NDArray[np.float64]
 
@@ -58,7 +58,7 @@ def _within(
     ld = DiscreteLagrangian(problem.ld.lagrangian, problem.grid)
     stopping = dataclasses.replace(problem, ld=ld, goal=stop, via=())
     path = stopping.path(curve)
-    return (stopping, path) if meets(stopping, path) else None
+    return (stopping, path) if satisfies(stopping, path) else None
 
 
 def _to_rest(problem: TrajectoryProblem, time: float) -> Curve:

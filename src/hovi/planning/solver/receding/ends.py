@@ -59,7 +59,7 @@ def with_strictness(problem: TrajectoryProblem, strict: bool | None) -> Trajecto
 
 
 def as_start(given: End, problem: TrajectoryProblem) -> State:
-    """A start, from whatever `plan` takes. A frame is met in the configuration nearest to the old.
+    """A start, from whatever `plan` takes. A frame stands for its configuration nearest to the old.
 
     Raises InputError, and UnreachableError for a frame that no configuration brings there.
     """

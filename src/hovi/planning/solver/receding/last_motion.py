@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from hovi.planning.solver.central_path import CentralPath
 
 
-def meets(problem: TrajectoryProblem, path: DiscretePath) -> bool:
+def satisfies(problem: TrajectoryProblem, path: DiscretePath) -> bool:
     """Whether a path with the problem's ends satisfies its limits, distances and equations
     everywhere.
 

@@ -7,13 +7,13 @@ from typing import Any
 from hovi.discrete.trajectory import Trajectory
 from hovi.planning.conditions.condition import Bounded
 from hovi.planning.solver.condition_excess import ConditionBounds
-from hovi.planning.solver.requirements.requirement import MET, Requirement
+from hovi.planning.solver.requirements.requirement import SATISFIED, Requirement
 from hovi.system.dataclass import dataclass
 
 
 @dataclass(frozen=True, eq=False)
 class Asked(Requirement):
-    """Conditions hold at all times, to their own tolerance or MET."""
+    """Conditions hold at all times, to their own tolerance or SATISFIED."""
 
     given: tuple[Bounded, ...]
 
@@ -21,7 +21,7 @@ class Asked(Requirement):
         """The first condition that is exceeded, where it is exceeded most."""
         for each in self.given:
             excess, sentence = ConditionBounds(each).worst(motion)
-            if not excess <= max(MET, each.tolerance):
+            if not excess <= max(SATISFIED, each.tolerance):
                 return sentence
         return ""
 

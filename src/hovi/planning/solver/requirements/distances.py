@@ -17,13 +17,13 @@ from hovi.planning.clearance.clearance_violation import (
 )
 from hovi.planning.clearance.distances import Distances, distances_between
 from hovi.planning.problem.problem import TrajectoryProblem
-from hovi.planning.solver.requirements.requirement import MET, Requirement
+from hovi.planning.solver.requirements.requirement import SATISFIED, Requirement
 from hovi.system.dataclass import dataclass
 
 
 @dataclass(frozen=True, eq=False)
 class Apart(Requirement):
-    """Every pair of shapes keeps the margin, to MET in [m]."""
+    """Every pair of shapes keeps the margin, to SATISFIED in [m]."""
 
     problem: TrajectoryProblem
     clearance: Clearance
@@ -34,7 +34,7 @@ class Apart(Requirement):
         if distances is None:
             return ""
         margin = float(self.clearance.margin)
-        pairs = near_pairs(motion, distances, margin - MET)
+        pairs = near_pairs(motion, distances, margin - SATISFIED)
         if len(pairs) == 0:
             return ""
         near = distances.restricted(pairs.tolist())

@@ -11,7 +11,7 @@ from hovi.discrete.trajectory import Trajectory
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.notation.goal_turns import turns_missed
 from hovi.planning.problem.problem import TrajectoryProblem
-from hovi.planning.solver.requirements.requirement import MET, Requirement
+from hovi.planning.solver.requirements.requirement import SATISFIED, Requirement
 from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
@@ -26,7 +26,7 @@ class Ends(Requirement):
     problem: TrajectoryProblem
 
     def violation(self, motion: Trajectory) -> str:
-        """How far the ends are from the problem's, or why these cannot be met."""
+        """How far the ends are from the problem's, or why these cannot be reached."""
         missed = misses(self.problem, motion.path) or self._turns_missed(motion)
         return f"the motion {missed}" if missed else self.problem.unreachable
 
@@ -49,7 +49,7 @@ def misses(problem: TrajectoryProblem, path: DiscretePath) -> str:
     parts = [_miss(problem, path, 0, "starts")]
     if isinstance(problem.goal, FrameGoal):
         distance, angle = problem.goal.miss(problem.robot, path.q[-1])
-        if max(distance, angle) > MET:
+        if max(distance, angle) > SATISFIED:
             parts.append(f"ends {distance:.3g} m and {angle:.3g} rad from the goal of its frame")
     elif not isinstance(problem.goal, Periodic):
         parts.append(_miss(problem, path, 1, "ends"))
@@ -69,7 +69,7 @@ def _miss(problem: TrajectoryProblem, path: DiscretePath, end: int, verb: str) -
         change = on.difference(wanted[0], given[0]) if i == 0 else given[i] - wanted[i]
         change = np.where(problem.free_ends[end, i], 0.0, change)
         joint = int(np.argmax(np.abs(change)))
-        if abs(change[joint]) > MET:
+        if abs(change[joint]) > SATISFIED:
             units = on.coordinate_units[joint]
             unit = units[i] if i < 3 else f"{units[0]}/s^{i}"
             name = on.coordinate_names[joint]

@@ -12,21 +12,21 @@ from hovi.planning.problem.limits import Limits
 from hovi.planning.solver.limits.limited_coordinates import LimitedCoordinates
 from hovi.planning.solver.outcome.control_polygons import exceeds
 from hovi.planning.solver.requirements.limit_margins import limit_margins
-from hovi.planning.solver.requirements.requirement import MET, Requirement
+from hovi.planning.solver.requirements.requirement import SATISFIED, Requirement
 from hovi.robot.space.coordinates import Coordinates
 from hovi.system.dataclass import dataclass
 
 
 @dataclass(frozen=True, eq=False)
 class WithinLimits(Requirement):
-    """lower <= (q, v, a, tau, jerk, d tau / dt) <= upper, to the limits' own tolerance or MET."""
+    """lower <= (q, v, a, tau, jerk, d tau / dt) <= upper, to their own tolerance or SATISFIED."""
 
     limits: Limits
     coordinates: Coordinates
 
     def violation(self, motion: Trajectory) -> str:
         """The limit that is exceeded most: polynomials are compared exactly, torques sampled."""
-        most = max(MET, self.limits.tolerance)
+        most = max(SATISFIED, self.limits.tolerance)
         limited = LimitedCoordinates.of(self.limits, motion.grid, motion.space)
         if not exceeds(motion, self.limits, limited, most):
             sampled = excess_of(motion, self.limits, limited.others(self.limits))

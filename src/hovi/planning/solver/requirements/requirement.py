@@ -7,7 +7,7 @@ from typing import Any
 
 from hovi.discrete.trajectory import Trajectory
 
-MET = 1e-6
+SATISFIED = 1e-6
 """Excess over a limit relative to its range, and distance in [rad] or [m], up to which a motion
 satisfies a requirement."""
 
@@ -17,7 +17,7 @@ class Requirement(ABC):
 
     @abstractmethod
     def violation(self, motion: Trajectory) -> str:
-        """The condition that a motion violates most, anywhere, as a clause; "" if all hold to MET.
+        """The condition that a motion violates most, as a clause; "" if all hold to SATISFIED.
 
         Raises OutOfTimeError when the deadline in force passes before that is known.
         """
