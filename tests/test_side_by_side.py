@@ -280,6 +280,28 @@ def test_what_cannot_be_compared_is_told_in_a_sentence(
         script.main([str(tmp_path)])
     with pytest.raises(SystemExit, match="neither the path of a checkout"):
         script.main(["no-such-commit"])
+    other = tmp_path / "other.json"
+    for text, said in (("", "cannot be read as"), ("[]", "is no"), ("{}", "is no")):
+        other.write_text(text)
+        with pytest.raises(SystemExit, match=f"{said}.* measurement that"):
+            script.main(["--load", str(other)])
+    with pytest.raises(SystemExit, match="No such file"):
+        script.main(["--load", str(tmp_path / "none.json")])
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--jobs", "0"], "--jobs must be at least 1, got 0"),
+        (["--save", "/no/folder/x.json"], "--save needs a file in a folder that exists"),
+    ],
+)
+def test_options_that_cannot_work_are_refused_before_anything_runs(
+    scripts: dict[str, Any], capsys: pytest.CaptureFixture[str], options: list[str], said: str
+) -> None:
+    with pytest.raises(SystemExit, match="2"):
+        scripts["side_by_side"].main(["HEAD", *options])
+    assert said in capsys.readouterr().err
 
 
 def test_statements_count_what_formatting_leaves(scripts: dict[str, Any]) -> None:

@@ -513,12 +513,21 @@ def parsed(arguments: Sequence[str] | None) -> argparse.Namespace:
     given = parser.parse_args(arguments)
     if (given.before is None) == (given.load is None):
         parser.error("give BEFORE, the path of a checkout or a commit, or --load FILE.")
+    if given.jobs < 1:
+        parser.error(f"--jobs must be at least 1, got {given.jobs}.")
+    if given.save is not None and not given.save.resolve().parent.is_dir():
+        parser.error(f"--save needs a file in a folder that exists, got {given.save}.")
     return given
 
 
 def loaded(given: argparse.Namespace) -> dict[str, Any]:
     """The saved results; those of other problems are refused."""
-    saved: dict[str, Any] = json.loads(given.load.read_text())
+    try:
+        saved: dict[str, Any] = json.loads(given.load.read_text())
+    except (OSError, ValueError) as error:
+        sys.exit(f"{given.load} cannot be read as a measurement that --save wrote: {error}.")
+    if not isinstance(saved, dict) or not {"seed", "quick", "rows"} <= saved.keys():
+        sys.exit(f"{given.load} is no measurement that --save wrote: give another file.")
     for key in ("seed", "quick"):
         if saved[key] != getattr(given, key):
             sys.exit(f"{given.load} was measured with another --{key}: {saved[key]}.")

@@ -146,6 +146,12 @@ def some_of(names: Iterable[str], most: int = 4) -> str:
     return ", ".join(found[:most]) + more
 
 
+def reason(error: BaseException) -> str:
+    """The last line of what an error of other code says, or its kind, without a period."""
+    lines = str(error).strip().splitlines() or [type(error).__name__]
+    return lines[-1].removesuffix(".")
+
+
 def _sanitized(sentence: str) -> str:
     shorter = _LONG_RUN.sub(lambda word: f"{word[0][:80]}...{word[0][-40:]}", sentence)
     printable = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in shorter)

@@ -325,8 +325,8 @@ class DiscretePath(Summarized):
 
 
 def outside_motion(time: float, duration: float) -> str:
-    """The message about a via point outside of the motion. time, duration: in [s]."""
+    """The message about a via point or condition outside of the motion. time, duration: in [s]."""
     return (
-        f"a via point at {time:g} s is not inside the motion of {duration:g} s: choose a time "
-        "within it."
+        f"a via point or condition at {time:g} s is not inside the motion of {duration:g} s: "
+        "choose a time within it."
     )

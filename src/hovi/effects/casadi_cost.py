@@ -9,7 +9,7 @@ import casadi as ca
 
 from hovi.effects.effect import Effect, Touch
 from hovi.effects.expressions.symbols import SceneSymbols
-from hovi.errors import SceneError
+from hovi.errors import SceneError, reason
 from hovi.system.dataclass import dataclass
 
 if TYPE_CHECKING:
@@ -44,11 +44,10 @@ class CasadiCost(Effect):
         try:
             found = ca.SX(self.cost(q, v, a, tau, t))
         except Exception as error:
-            reason = str(error).strip().splitlines()[-1:] or [type(error).__name__]
             raise SceneError(
                 "effect 'casadi_cost': cost must map the SX symbols (q, v, a, tau, t), of "
                 f"{q.numel()}, {v.numel()}, {a.numel()}, {tau.numel()} and 1 rows, to one number, "
-                f"but it failed: {reason[0].removesuffix('.')}."
+                f"but it failed: {reason(error)}."
             ) from error
         _require_number(found, [q, v, a, tau, t])
         return None if found.is_zero() else found

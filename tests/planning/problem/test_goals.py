@@ -286,7 +286,7 @@ def test_a_bad_via_point_is_named_by_its_number_and_line(tmp_path, models) -> No
         (
             "[[via]]\ntime = 5.0\nq = [0,0,0,0,0,0]",
             2,
-            "a via point at 5 s is not inside the motion",
+            "a via point or condition at 5 s is not inside the motion",
         ),
         (
             "[[via]]\ntme = 0.5\nq = [0,0,0,0,0,0]",

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.dynamics.point_function import PointFunction
-from hovi.errors import InputError, nearest
+from hovi.errors import InputError, nearest, reason
 from hovi.planning.conditions.function import ARGUMENTS, Curvature, Function, Points, Slopes
 from hovi.robot.robot import Robot
 from hovi.robot.space import tangent
@@ -171,7 +171,10 @@ def _called(given: Callable[..., Any], what: str, symbols: dict[str, ca.SX]) -> 
                 f"{what}: its function takes {each!r}, which is none of q, v, a, tau and t: "
                 f"{nearest(each, ARGUMENTS)}"
             )
-    y = given(*(symbols[each] for each in names))
+    try:
+        y = given(*(symbols[each] for each in names))
+    except Exception as error:  # a user's own function may raise anything
+        raise InputError(f"{what}: its function failed: {reason(error)}.") from error
     try:
         y = ca.SX(y) if not isinstance(y, list | tuple) else ca.vertcat(*map(ca.SX, y))
     except (NotImplementedError, TypeError, ValueError):
@@ -182,5 +185,12 @@ def _called(given: Callable[..., Any], what: str, symbols: dict[str, ca.SX]) -> 
     if min(y.shape) != 1:
         raise InputError(
             f"{what}: its function must return a column of one or more values, got shape {y.shape}."
+        )
+    known = {each.element_hash() for x in symbols.values() for each in ca.vertsplit(x)}
+    foreign = [str(each) for each in ca.symvar(y) if each.element_hash() not in known]
+    if foreign:
+        raise InputError(
+            f"{what}: its function contains {', '.join(foreign[:3])}, which is none of q, v, a, "
+            "tau and t: give it a value."
         )
     return ca.vec(y)

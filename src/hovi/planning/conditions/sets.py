@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.checks.shapes import numbers_of
-from hovi.errors import InputError
+from hovi.errors import InputError, reason
 from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
@@ -89,10 +89,19 @@ class Between:
         bound = getattr(self, name)
         if not callable(bound):
             return np.broadcast_to(bound, (len(t), bound.size))
-        rows = [_numbers(f"{name} bound at t = {each:.4g} s", bound(float(each))) for each in t]
+        rows = [_value(f"{name} bound at t = {each:.4g} s", bound, float(each)) for each in t]
         if len({row.size for row in rows}) > 1:
             raise InputError(f"the {name} bound of a Between has not as many numbers at all times.")
         return np.stack(rows) if rows else np.zeros((0, 1))
+
+
+def _value(name: str, bound: Callable[[float], npt.ArrayLike], t: float) -> Array:
+    """A bound that is a function of time, at a time."""
+    try:
+        value = bound(t)
+    except Exception as error:  # a user's own function may raise anything
+        raise InputError(f"the {name} of a Between failed: {reason(error)}.") from error
+    return _numbers(name, value)
 
 
 def _numbers(name: str, value: npt.ArrayLike) -> Array:
