@@ -140,8 +140,32 @@ def test_a_sequence_keeps_the_power(scene: hovi.Scene) -> None:
     assert found.success, found.message
     assert np.abs(powers(found.trajectory, scene.robot)).max() <= 28.0 + 2e-6 * 56.0
     segments[0] = hovi.Segment(GOAL, 1.5, limits={"power": 28.0})
-    with pytest.raises(InputError, match="limits on the power must be those of all segments"):
+    with pytest.raises(InputError, match="limits on the power must be the same in all segments"):
         hovi.plan_sequence(scene, START, segments, **OPTIONS)
+
+
+@pytest.mark.parametrize("own", [{}, {"jerk": 500.0}], ids=["alike", "one with a jerk"])
+def test_segments_with_the_same_power_keep_it(
+    scene: hovi.Scene, ur5: hovi.Robot, own: dict[str, float]
+) -> None:
+    limits = {"power": 28.0}, {"power": 28.0, **own}
+    segments = [
+        hovi.Segment(q, 1.5, limits=each) for q, each in zip((GOAL, START), limits, strict=True)
+    ]
+    found = hovi.plan_sequence(scene, START, segments, smooth=bool(own), **OPTIONS)
+    assert found.success, found.message
+    assert np.abs(powers(found.trajectory, ur5)).max() <= 28.0 + 2e-6 * 56.0
+    assert found.problem is not None
+    assert found.problem.limits is not None
+    assert [each.name for each in found.problem.limits.conditions] == ["power"]
+
+
+def test_a_saved_task_keeps_the_power_of_its_limits(tmp_path: Path) -> None:
+    task = hovi.load_task(hovi.example("ur5_reach"))
+    limits = hovi.as_limits(task.scene.robot, {"power": {"elbow_joint": [-20.0, 28.0]}})
+    hovi.save_task(task.with_options(limits=limits), tmp_path / "task.toml")
+    found = hovi.load_task(tmp_path / "task.toml").options.limits
+    assert found["power"] == {"elbow_joint": [-20.0, 28.0]}
 
 
 def test_among_obstacles_and_links_the_power_is_limited_too(

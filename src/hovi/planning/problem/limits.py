@@ -105,11 +105,11 @@ class Limits(LimitsSummary):
             parts = [_with_all_kinds(each) for each in parts]
         for each in parts:
             require_shape("the limits of a segment", each.lower, *parts[0].lower.shape)
-            if each.conditions != parts[0].conditions:
+            if each._named_bounds != parts[0]._named_bounds:
                 words = " and ".join(sorted({x.name for p in parts for x in p.conditions}))
                 raise InputError(
-                    f"limits on the {words} must be those of all segments: give them for the whole "
-                    "motion."
+                    f"limits on the {words} must be the same in all segments: give each of them "
+                    "the same ones."
                 )
         lower = np.stack([each.lower for each in parts])
         upper = np.stack([each.upper for each in parts])
@@ -157,6 +157,12 @@ class Limits(LimitsSummary):
     def until(self, time: float) -> Limits:
         """The limits just before a time, in [s]: those of its segment, or these."""
         return self.parts[int(np.searchsorted(np.array(self.ends), time))] if self.parts else self
+
+    @property
+    def _named_bounds(self) -> list[tuple[object, ...]]:
+        """Name, joints and bounds of every condition, which are alike in all segments."""
+        sides = [(each, each.on.lower, each.on.upper) for each in self.conditions]
+        return [(x.name, x.of, *(np.asarray(side).tolist() for side in s)) for x, *s in sides]
 
     @property
     def _empty(self) -> npt.NDArray[np.bool_]:
@@ -424,4 +430,4 @@ def _with_all_kinds(limits: Limits) -> Limits:
         return limits
     more = np.full((len(KINDS) - len(limits.kinds), limits.lower.shape[1]), np.inf)
     lower, upper = np.concatenate([limits.lower, -more]), np.concatenate([limits.upper, more])
-    return Limits(lower, upper, limits.tolerance)
+    return dataclasses.replace(limits, lower=lower, upper=upper)

@@ -54,6 +54,11 @@ def limits_value(limits: str | Limits | Mapping[str, Any], robot: Robot) -> str 
             for i in bounded
         }
         table |= {kind: pairs} if pairs else {}
+    for each in limits.conditions:
+        lower, upper = (side[0].tolist() for side in each.on.at(np.zeros(1), len(each.of)))
+        table[each.name] = dict(
+            zip(each.of, map(list, zip(lower, upper, strict=True)), strict=True)
+        )
     return table
 
 
