@@ -160,6 +160,25 @@ def test_segments_with_the_same_power_keep_it(
     assert [each.name for each in found.problem.limits.conditions] == ["power"]
 
 
+def test_a_bound_that_begins_later_holds_between_the_points_too(two_link: hovi.Robot) -> None:
+    """It is infinite at first: the check between the points left it out altogether."""
+    scene = hovi.Scene(two_link, [hovi.effects.Gravity()])
+    most = 1.6
+
+    def upper(t: float) -> float:
+        return np.inf if t < 0.2 else most
+
+    late = hovi.Condition('v["shoulder"]', hovi.Between(upper=upper), name="late", scale=1.0)
+    ends = {"start": [0.0, 0.0], "goal": [1.0, 0.5], "duration": 1.0, "limits": "none"}
+    free = hovi.plan(scene, **ends, **OPTIONS)
+    found = hovi.plan(scene, **ends, conditions=[late], **OPTIONS)
+    assert found.success, found.message
+    t = np.linspace(0.2, 1.0, 4001)
+    assert (
+        found.trajectory.sample(t).v[:, 0].max() <= most + 1e-6 < free.trajectory.sample(t).v.max()
+    )
+
+
 def test_a_saved_task_keeps_the_power_of_its_limits(tmp_path: Path) -> None:
     task = hovi.load_task(hovi.example("ur5_reach"))
     limits = hovi.as_limits(task.scene.robot, {"power": {"elbow_joint": [-20.0, 28.0]}})

@@ -482,6 +482,11 @@ def _problems() -> list[Call]:
         own(frame_goal, "check", robot()),
         own(frame_goal, "difference", robot()),
         build(hovi.Via, time=0.5, goal=goal),
+        build(hovi.Between, lower=-1.0, upper=[1.0, 2.0]),
+        build(hovi.Equal, value=[0.1, 0.2]),
+        build(hovi.AtTimes, times=[0.3, 0.6]),
+        build(hovi.Points, q=np.zeros((3, 2)), v=np.zeros((3, 2)), t=np.zeros(3)),
+        call(hovi.Condition, "tau * v", hovi.Between(-1.0, 1.0), unit="W", tolerance=1e-5),
         call(hovi.Tolerance.of, "1 mm", robot()),
         own(hovi.Tolerance.of("1 mm", robot()), "in_words", 1e-3, "tip"),
         build(

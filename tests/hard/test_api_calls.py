@@ -19,6 +19,8 @@ LEFT_OUT = {
     *("Accuracy", "Certificate", "Flow", "MotionError", "Simulation", "Solution", "Status"),
     *("Tolerance", "Tracking", "Robot", "HoviError"),
     *("Extreme", "Extremes", "LimitSet", "LimitSource", "MujocoReplay"),
+    # abstract
+    "Function",
     # needs an optional library, and has tests of its own
     "replay_in_mujoco",
     # packages, of which the members are called

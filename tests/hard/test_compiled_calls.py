@@ -177,7 +177,7 @@ def test_a_neighbor_that_is_no_point_of_its_hull_is_refused(wrong: int) -> None:
 @pytest.mark.parametrize("keep", [-1.0, -5e-324, -np.inf, np.nan])
 def test_a_negative_share_of_a_gap_is_refused(name: str, keep: float) -> None:
     """Steps were clamped between bounds in the wrong order, which is undefined."""
-    with pytest.raises(ValueError, match="keep must be a fraction of the gaps, 0 or more"):
+    with pytest.raises(ValueError, match="keep must be a share of the gaps, 0 or more"):
         ENTRIES[name].function(**(full_call(name) | {"keep": keep}))
 
 

@@ -10,6 +10,7 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 import numpy.typing as npt
 
+from hovi.checks.arguments import check_arguments_except
 from hovi.checks.kinds import is_number
 from hovi.checks.shapes import numbers_of
 from hovi.discrete.grid import DiscretePath
@@ -30,6 +31,7 @@ TOLERANCE = 1e-6
 EVERYWHERE: Any = AtPoints()
 
 
+@check_arguments_except("function", "on", "where")
 @dataclass(frozen=True, eq=False)
 class Condition(Generic[Values, Place]):
     """y(q, v, a, tau, t) in a set, at instants of a motion.

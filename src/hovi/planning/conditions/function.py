@@ -8,6 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 import numpy.typing as npt
 
+from hovi.checks.arguments import check_arguments
 from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
@@ -19,6 +20,7 @@ ARGUMENTS = "q", "v", "a", "tau", "t"
 """What a function may depend on."""
 
 
+@check_arguments
 @dataclass(frozen=True, eq=False)
 class Points:
     """A motion at P instants, of which a Function returns its values.

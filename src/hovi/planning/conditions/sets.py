@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import numpy.typing as npt
 
+from hovi.checks.arguments import check_arguments
 from hovi.checks.shapes import numbers_of
 from hovi.errors import InputError, reason
 from hovi.system.dataclass import dataclass
@@ -16,6 +17,7 @@ Bound = npt.ArrayLike | Callable[[float], npt.ArrayLike]
 """A number, one for each entry of y, or a function of the time in [s] that returns either."""
 
 
+@check_arguments
 @dataclass(frozen=True, eq=False)
 class Equal:
     """y = value.
@@ -37,6 +39,7 @@ class Equal:
         return np.asarray(y - np.asarray(self.value))
 
 
+@check_arguments
 @dataclass(frozen=True, eq=False)
 class Between:
     """lower <= y <= upper.
@@ -56,6 +59,11 @@ class Between:
                 object.__setattr__(self, name, _numbers(name, bound))
         if not self.varies:
             low, high = self.at(np.zeros(1), None)
+            if 1 not in (low.size, high.size) and low.size != high.size:
+                raise InputError(
+                    f"a Between has {low.size} lower and {high.size} upper bounds: give one, or "
+                    "one for each entry of y."
+                )
             if (low >= high).any():
                 raise InputError(
                     f"the range of a Between is empty: [{self.lower}, {self.upper}]; lower must be "

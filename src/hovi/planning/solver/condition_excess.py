@@ -13,6 +13,9 @@ from hovi.planning.problem.limit_violation import SampledBounds, excess_along, e
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]
 
+NO_BOUND = 1e3
+"""Distance from a bound, as a fraction of the scale, where it is infinite at an instant."""
+
 
 class ConditionBounds(SampledBounds):
     """lower(t) - y <= 0 and y - upper(t) <= 0 of a condition, over its scale, (1, 2 size)."""
@@ -20,15 +23,18 @@ class ConditionBounds(SampledBounds):
     def __init__(self, given: Bounded) -> None:
         self.given, self.scale = given, scales(given)
         self.tolerance = given.tolerance
-        sides = given.on.at(np.zeros(1), given.y.size)
-        self.upper = np.where(np.isfinite(np.concatenate(sides, axis=1)), 0.0, np.inf)
+        sides = zip(
+            given.on.at(np.zeros(1), given.y.size), (given.on.lower, given.on.upper), strict=True
+        )
+        known = [np.isfinite(at_start) | callable(bound) for at_start, bound in sides]
+        self.upper = np.where(np.concatenate(known, axis=1), 0.0, np.inf)
 
     def outputs(self, trajectory: Trajectory, k: Index, s: Array) -> Array:
         """lower(t) - y and y - upper(t) at positions s in intervals k, (M, 1, 2 size)."""
         y, t = self.values(trajectory, k, s)
         low, high = self.given.on.at(t, self.given.y.size)
         sides = np.concatenate([low - y, y - high], axis=1) / np.tile(self.scale, 2)
-        return np.where(np.isfinite(self.upper), sides, 0.0)[:, None]
+        return np.where(np.isfinite(self.upper), np.maximum(sides, -NO_BOUND), 0.0)[:, None]
 
     def values(self, trajectory: Trajectory, k: Index, s: Array) -> tuple[Array, Array]:
         """y (M, size) and the times (M,) at positions s in intervals k."""
