@@ -14,8 +14,8 @@ import pytest
 
 import hovi
 from hovi import Solution, Status
-from hovi.scene.effort_lagrangian import EffortLagrangian
 from samples.small_robots import arm
+from samples.stopped_searches import InterruptedEvaluations
 
 MASS, WAY = 0.5, 0.8
 FAILURE = re.compile(
@@ -121,21 +121,12 @@ def test_a_limit_that_is_not_reached_leaves_the_best_duration(force: float) -> N
 def test_what_ends_the_search_early_leaves_the_best_so_far(
     share: float, force: float | None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    output, calls, last = EffortLagrangian.output, 0, -1
-
-    def interrupting(self: EffortLagrangian, *jet: Any, **more: Any) -> Any:
-        nonlocal calls
-        calls += 1
-        if calls == last:
-            raise KeyboardInterrupt
-        return output(self, *jet, **more)
-
-    monkeypatch.setattr(EffortLagrangian, "output", interrupting)
+    evaluations = InterruptedEvaluations(monkeypatch)
     slid((0.1, 10.0), 1.0, force)
-    calls, last = 0, max(2, int(share * calls))
+    evaluations.restart(max(2, int(share * evaluations.calls)))
     found = slid((0.1, 10.0), 1.0, force)
     assert (found.success, found.status) == (False, Status.INTERRUPTED)
-    assert calls <= last + 60  # and nothing is solved after that
+    assert evaluations.calls <= evaluations.last + 60  # and nothing is solved after that
     assert agrees(found), found.message
     assert np.isfinite(found.cost)
     assert 0.1 <= found.trajectory.duration <= 10.0

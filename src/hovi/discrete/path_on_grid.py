@@ -74,12 +74,11 @@ def _of_any_order(curve: Curve, grid: Grid, ends: Ends, on: Coordinates | None) 
 
 def moved(path: DiscretePath, grid: Grid, ends: Ends, on: Coordinates) -> DiscretePath:
     """A path plus the cubic, or Hermite polynomial, that moves its ends to others."""
-    old = (path.q, *np.moveaxis(path.rates, 1, 0))
     if grid.order == 2:
         return _moved_by_cubic(path, grid, ends, on)
-    space = on.curved_space
+    space, old = on.curved_space, np.moveaxis(path.rates, 1, 0)
     dq = on.difference(path.q[[0, -1]], ends[0])
-    rates = [new - x[[0, -1]] for x, new in zip(old[1:], ends[1:], strict=True)]
+    rates = [new - x[[0, -1]] for x, new in zip(old, ends[1:], strict=True)]
     change = np.stack([dq, *rates], axis=1)
     if not change.any():
         return path

@@ -2,21 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from hovi.errors import warn
 from hovi.flows import interval
+from hovi.flows.former_names import former_names
 
 _NAMES = {"Segment": "Interval", "SegmentLagrangian": "FlatLagrangian"}
 
-
-def _deprecated(name: str) -> Any:
-    """What has had this name, with a DeprecationWarning."""
-    if name not in _NAMES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    warn(f"{__name__}.{name} is now {interval.__name__}.{_NAMES[name]}.", DeprecationWarning)
-    return getattr(interval, _NAMES[name])
-
-
 if not TYPE_CHECKING:  # otherwise the type checker accepts every misspelt name
-    __getattr__ = _deprecated
+    __getattr__ = former_names(__name__, interval, _NAMES)

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from time import monotonic
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -22,12 +20,11 @@ from hovi.planning.task_file.task import Task
 from hovi.robot.bundled_models import example
 from hovi.robot.loading import load_robot
 from hovi.robot.robot import Robot
-from hovi.scene.effort_lagrangian import EffortLagrangian
 from hovi.scene.scene import Scene
 from hovi.schemes import galerkin
-from hovi.system import deadline
 from oracles.on_grid import solve_on_grid
 from samples.paper_arm import HANG, REACH_Q, REACH_V
+from samples.stopped_searches import InterruptedEvaluations, LeapingClock
 
 SCENES = ("two_link_reach", "ur5_reach", "panda_reach")
 TOLERANCES = (1e-2, 1e-4, 1e-6, 1e-9, "1 mm", "1e-3 mm", "0.1 deg", "1e-5 rad")
@@ -139,13 +136,7 @@ def test_a_time_limit_is_reported_with_the_error_so_far(
     arm_scene: Scene, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """By a clock that leaps after the first grid."""
-    leap = 0.0
-
-    def late() -> None:
-        nonlocal leap
-        leap = 1e6
-
-    monkeypatch.setattr(deadline, "time", SimpleNamespace(monotonic=lambda: monotonic() + leap))
+    late = LeapingClock(monkeypatch).leap
     given = {"limits": "none", "tolerance": 1e-10, "intervals": 6, "time_limit": 1e5}
     goal = State(REACH_Q, REACH_V)
     ended = plan(arm_scene, HANG, goal, 1.0, **given, progress=AtRound(1, late))
@@ -160,21 +151,12 @@ def test_an_interrupt_returns_the_best_candidate(
     arm_scene: Scene, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """In the first solve, in the first comparison, and later."""
-    output, calls, last = EffortLagrangian.output, 0, -1
-
-    def interrupting(self: EffortLagrangian, *jet: Any, **more: Any) -> Any:
-        nonlocal calls
-        calls += 1
-        if calls == last:
-            raise KeyboardInterrupt
-        return output(self, *jet, **more)
-
-    monkeypatch.setattr(EffortLagrangian, "output", interrupting)
+    evaluations = InterruptedEvaluations(monkeypatch)
     ends, given = (arm_scene, HANG, State(REACH_Q, REACH_V), 1.0), {"intervals": 6}
     assert plan(*ends, limits="none", tolerance=1e-10, **given).success
-    whole, known = calls, list[float]()
+    whole, known = evaluations.calls, list[float]()
     for number in range(2, whole, 2):
-        calls, last = 0, number
+        evaluations.restart(number)
         found = plan(*ends, limits="none", tolerance=1e-10, **given)
         assert not found.success
         assert found.status in (Status.INTERRUPTED, Status.UNRESOLVED)

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-from time import monotonic
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -21,9 +19,9 @@ from hovi.planning.problem.limits import as_limits
 from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
 from hovi.schemes import by_name
-from hovi.system import deadline
 from oracles.on_grid import solve_on_grid
 from samples.paper_arm import HANG, REACH_Q
+from samples.stopped_searches import LeapingClock
 
 RESOLVED = 0.01
 """Relative error of the cost above which a motion is no minimum."""
@@ -329,13 +327,12 @@ def test_a_minimum_that_no_time_is_left_to_check_is_not_called_one(
     arm_scene: Scene, limits: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """By a clock that leaps when the plan says that it compares."""
-    leap = 0.0
+    clock = LeapingClock(monkeypatch)
 
     def progress(text: str, share: float) -> None:
-        nonlocal leap
-        leap = 1e6 if "comparing" in text else leap
+        if "comparing" in text:
+            clock.leap()
 
-    monkeypatch.setattr(deadline, "time", SimpleNamespace(monotonic=lambda: monotonic() + leap))
     given = {"limits": limits, "intervals": 16, "scheme": "galerkin-2"}
     late = hovi.plan(arm_scene, HANG, REACH_Q, 1.0, time_limit=1e5, progress=progress, **given)
     assert (late.success, late.status, late.minima) == (False, Status.TIME_LIMIT, ())

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from time import monotonic
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -14,11 +12,10 @@ import hovi
 from hovi import Solution, Status, plan
 from hovi.effects import Gravity
 from hovi.planning.problem.limits import as_limits
-from hovi.scene.effort_lagrangian import EffortLagrangian
 from hovi.scene.scene import Scene
-from hovi.system import deadline
 from hovi.system.interruption import interrupted, interruptible
 from samples.paper_arm import HANG, REACH_Q
+from samples.stopped_searches import InterruptedEvaluations, LeapingClock
 from samples.uneven_chain import uneven_chain
 
 STEPS = 300
@@ -118,13 +115,7 @@ def test_a_deadline_ends_the_continuation_with_the_best_so_far(
     light_hand: Scene, failed: Solution, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A clock that leaps at the first stage."""
-    leap = 0.0
-
-    def late() -> None:
-        nonlocal leap
-        leap = 1e6
-
-    monkeypatch.setattr(deadline, "time", SimpleNamespace(monotonic=lambda: monotonic() + leap))
+    late = LeapingClock(monkeypatch).leap
     found = swung(light_hand, time_limit=1e5, progress=Reports(late))
     assert (found.success, found.status) == (False, Status.TIME_LIMIT)
     assert found.cost == failed.cost
@@ -135,27 +126,19 @@ def test_a_deadline_ends_the_continuation_with_the_best_so_far(
 def test_an_interrupt_ends_the_continuation_with_the_best_so_far(
     light_hand: Scene, failed: Solution, monkeypatch: pytest.MonkeyPatch, where: str
 ) -> None:
-    output, calls = EffortLagrangian.output, -1_000_000
-
-    def interrupting(self: EffortLagrangian, *jet: Any, **more: Any) -> Any:
-        nonlocal calls
-        calls += 1
-        if calls == 30:
-            raise KeyboardInterrupt
-        return output(self, *jet, **more)
+    evaluations = InterruptedEvaluations(monkeypatch)
 
     def act() -> None:
-        nonlocal calls
-        calls = 0
+        evaluations.restart(30)
         if where == "between two":
             raise KeyboardInterrupt
 
-    monkeypatch.setattr(EffortLagrangian, "output", interrupting)
     found = swung(light_hand, progress=Reports(act))
     assert (found.success, found.status) == (False, Status.INTERRUPTED)
     assert found.cost == failed.cost
     assert "was interrupted" in found.message
-    assert 0 <= calls <= 60
+    assert evaluations.last == 30
+    assert evaluations.calls <= 60
 
 
 def test_an_interrupt_between_two_stages_ends_the_whole_call(light_hand: Scene) -> None:

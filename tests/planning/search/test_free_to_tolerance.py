@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import pytest
 
@@ -14,9 +12,9 @@ from hovi.planning.problem.tolerance import Accuracy
 from hovi.planning.task_file.reading import load_task
 from hovi.planning.task_file.task import Task
 from hovi.robot.bundled_models import example
-from hovi.scene.effort_lagrangian import EffortLagrangian
 from hovi.scene.scene import Scene
 from samples.paper_arm import HANG, REACH_Q, REACH_V
+from samples.stopped_searches import InterruptedEvaluations
 
 BOUNDS = 0.5, 6.0
 WEIGHT = 50.0
@@ -139,18 +137,9 @@ def test_an_interrupt_is_no_success_unless_the_duration_is_the_best(
     task: Task, share: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """In the first search, in a refinement, and in the search on a finer grid."""
-    output, calls, last = EffortLagrangian.output, 0, -1
-
-    def interrupting(self: EffortLagrangian, *jet: Any, **more: Any) -> Any:
-        nonlocal calls
-        calls += 1
-        if calls == last:
-            raise KeyboardInterrupt
-        return output(self, *jet, **more)
-
-    monkeypatch.setattr(EffortLagrangian, "output", interrupting)
+    evaluations = InterruptedEvaluations(monkeypatch)
     freed(task, tolerance=1e-7, intervals=6)
-    calls, last = 0, int(share * calls)
+    evaluations.restart(int(share * evaluations.calls))
     found = freed(task, tolerance=1e-7, intervals=6)
     slope = abs(found.duration_derivative + WEIGHT)
     if found.success:

@@ -9,8 +9,8 @@ import pytest
 
 import hovi
 from hovi import Solution, Status
-from hovi.scene.effort_lagrangian import EffortLagrangian
 from oracles.on_grid import solve_on_grid
+from samples.stopped_searches import InterruptedEvaluations
 
 SCENES = {
     "two_link_reach": (20.0, (0.5, 4.0), "none"),
@@ -189,20 +189,11 @@ def test_ends_beyond_their_limits_have_no_motion_of_any_duration() -> None:
 
 def test_an_interrupt_is_told_as_no_success(monkeypatch: pytest.MonkeyPatch) -> None:
     """In the first solve, and in those for other durations."""
-    output, calls, last = EffortLagrangian.output, 0, -1
-
-    def interrupting(self: EffortLagrangian, *jet: Any, **more: Any) -> Any:
-        nonlocal calls
-        calls += 1
-        if calls == last:
-            raise KeyboardInterrupt
-        return output(self, *jet, **more)
-
-    monkeypatch.setattr(EffortLagrangian, "output", interrupting)
+    evaluations = InterruptedEvaluations(monkeypatch)
     assert freed((0.5, 4.0)).success
-    whole = calls
+    whole = evaluations.calls
     for share in (0.2, 0.5, 0.9):
-        calls, last = 0, int(share * whole)
+        evaluations.restart(int(share * whole))
         found = freed((0.5, 4.0))
         assert (found.success, found.status) == (False, Status.INTERRUPTED)
         assert "interrupted" in found.message

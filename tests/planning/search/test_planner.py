@@ -25,6 +25,7 @@ from hovi.schemes import by_name, galerkin, is_galerkin
 from oracles.on_grid import solve_on_grid
 from samples.manifold_robots import half_turning
 from samples.paper_arm import HANG, REACH_COST, REACH_Q, REACH_V
+from samples.stopped_searches import InterruptedEvaluations
 
 Array = npt.NDArray[np.float64]
 
@@ -281,18 +282,9 @@ def test_the_iteration_limit_is_of_one_solve(arm_scene: Scene) -> None:
 def test_an_interrupt_gives_the_best_so_far(
     arm_scene: Scene, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    output, calls = EffortLagrangian.output, 0
-
-    def interrupted_once(self: EffortLagrangian, *jet: Any, **more: Any) -> Any:
-        nonlocal calls
-        calls += 1
-        if calls == 60:
-            raise KeyboardInterrupt
-        return output(self, *jet, **more)
-
-    monkeypatch.setattr(EffortLagrangian, "output", interrupted_once)
+    evaluations = InterruptedEvaluations(monkeypatch, 60)
     found = swing_up(arm_scene, starts=1000)
-    assert calls < 110
+    assert evaluations.calls < 110
     assert "of 1000 starts" in found.message
     np.testing.assert_array_equal(found.trajectory.q[-1], -HANG)
 

@@ -62,3 +62,8 @@ def times_of(given: Given) -> list[float]:
 def bounded_of(given: Given) -> tuple[Bounded, ...]:
     """Those that hold at all times."""
     return tuple(each for each in given if isinstance(each.on, Between))
+
+
+def need_torques(bounded: Sequence[Bounded]) -> bool:
+    """Whether one of them depends on torques."""
+    return any("tau" in each.y.needs for each in bounded)

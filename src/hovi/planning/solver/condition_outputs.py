@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.discrete.trajectory import Trajectory
+from hovi.planning.conditions.asked import need_torques
 from hovi.planning.conditions.condition import scales
 from hovi.planning.conditions.function import Curvature, Points, Slopes
 from hovi.planning.problem.problem import TrajectoryProblem
@@ -36,11 +37,6 @@ class ConditionOutputs(PointOutputs):
     def size(self) -> int:
         """K, the number of values."""
         return sum(each.y.size for each in self.given)
-
-    @property
-    def needs_torques(self) -> bool:
-        """Whether one of them depends on torques."""
-        return any("tau" in each.y.needs for each in self.given)
 
     def bounds(self, t: Array) -> Range:
         """Bounds of the outputs at times, (P, K) each."""
@@ -68,7 +64,7 @@ class ConditionOutputs(PointOutputs):
     def expand(self, at: Points, force: Array) -> ExpandedOutputs:
         """Derivatives in (q, v, a): see the module."""
         n = at.v.shape[1]
-        J = self._torque_slopes(at) if self.needs_torques else None
+        J = self._torque_slopes(at) if need_torques(self.given) else None
         slopes, first = [], 0
         curvature, torques = np.zeros((len(at.q), 3 * n, 3 * n)), np.zeros((len(at.q), n))
         for each, scale in zip(self.given, self._scales, strict=True):

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from hovi.errors import InputError
-from hovi.planning.conditions.asked import as_conditions
+from hovi.planning.conditions.asked import as_conditions, need_torques
 from hovi.planning.conditions.condition import Equation
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.notation.summaries import ProblemSummary
@@ -35,7 +35,7 @@ def require_supported(problem: ProblemSummary, order: int) -> None:
         )
     if limits is not None:
         limits.require_order(order)
-    if any("tau" in each.y.needs for each in problem.bounds) and not problem.scenes:
+    if need_torques(problem.bounds) and not problem.scenes:
         raise InputError(
             "a condition on torques needs a Lagrangian of a scene, and this one is about no robot: "
             "leave it out, or name q, v, a and t alone."
@@ -65,6 +65,6 @@ def needs_torques(problem: ProblemSummary) -> bool:
     """Whether torques are part of the cost, are bounded, or vanish at passive joints."""
     limits = problem.limits
     bounded = limits is not None and limits.on_torques
-    bounded = bounded or any("tau" in each.y.needs for each in problem.bounds)
+    bounded = bounded or need_torques(problem.bounds)
     passive = any(scene.passive for scene in problem.scenes)
     return bounded or passive or problem.ld.lagrangian.needs_torques

@@ -139,8 +139,9 @@ class BoundedSearch:
 
     def no_margins(self) -> Array:
         """Zero margins, shape (2, N, kinds nv + pairs + values of conditions)."""
-        more = 0 if self.more is None else self.more.size
-        return np.zeros((2, self.problem.grid.intervals, self.limits.lower.size + more))
+        more = self.more
+        size = self.limits.lower.size + (0 if more is None else more.size)
+        return np.zeros((2, self.problem.grid.intervals, size))
 
     @property
     def more(self) -> PointOutputs | None:
@@ -376,10 +377,10 @@ class BoundedSearch:
         trajectory = self.problem.trajectory(path)
         both = excess_of(trajectory, self.limits, self.rows.of.others(self.limits))
         sides = np.stack(both).reshape(2, len(both[0]), -1)
-        if self.more is None:
+        more = self.more
+        if more is None:
             return sides
-        further = self.more.excess(trajectory, self.limits.tolerance)
-        return np.concatenate([sides, further], axis=2)
+        return np.concatenate([sides, more.excess(trajectory, self.limits.tolerance)], axis=2)
 
     def too_close(self, path: DiscretePath) -> str:
         """Which pair comes closer than the margin where there are rows of distances; "" if none."""
@@ -395,9 +396,9 @@ class BoundedSearch:
 
     def worst(self, path: DiscretePath) -> str:
         """The limit, distance or condition that is violated most: what, and when."""
-        trajectory = self.problem.trajectory(path)
-        if self.more is not None:
-            excess, clause = self.more.worst(trajectory, self.limits.tolerance)
+        trajectory, more = self.problem.trajectory(path), self.more
+        if more is not None:
+            excess, clause = more.worst(trajectory, self.limits.tolerance)
             if excess >= excess_along(trajectory, self.limits, refined=False).worst:
                 return clause
         sentence = worst_sentence(trajectory, self.limits, self.problem.coordinates)
