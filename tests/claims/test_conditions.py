@@ -14,6 +14,7 @@ import pytest
 
 import hovi
 from hovi.errors import InputError, SceneError
+from hovi.planning.solver.condition_outputs import ConditionOutputs
 
 START, GOAL = np.array([0, -1.5, 1.5, 0, 0, 0.0]), np.array([1.0, -1.0, 1.0, 0.5, 0.5, 0.5])
 OPTIONS: dict[str, Any] = {"self_collision": False}
@@ -329,6 +330,15 @@ REFUSED: dict[str, tuple[Callable[[], Any], str]] = {
     "scale": (broken("q", scale=[1.0, 2.0]), "must be one number or 6"),
     "no scale": (broken("q", scale=-1.0), "must be positive"),
     "tolerance": (broken("q", tolerance=0.0), "needs a positive tolerance"),
+    "small tolerance": (broken("q", tolerance=9e-7), "a positive tolerance of at least 1e-06"),
+    "scale of a value": (
+        broken("q", hovi.Equal(), where=hovi.AtTimes(0.5), scale=2.0),
+        "leave its `scale` and `tolerance` out",
+    ),
+    "tolerance of a value": (
+        broken("q", hovi.Equal(), where=hovi.AtTimes(0.5), tolerance=1e-3),
+        "leave its `scale` and `tolerance` out",
+    ),
     "names": (broken("q", of=("elbow",)), "needs 6 names"),
     "set": (broken("q", 3), "needs a hovi.Between or a hovi.Equal"),
     "along": (broken("q", hovi.Equal()), "an equation along the whole motion"),
@@ -383,6 +393,24 @@ def test_what_cannot_be_asked_is_refused_in_one_sentence(scene: hovi.Scene, what
         planned()
     assert sentence in str(refused.value)
     assert str(refused.value).count("\n") == 0
+
+
+def test_what_is_tolerated_is_not_named_as_the_worst(two_link: hovi.Robot) -> None:
+    """A loose condition is exceeded by more, and within its tolerance."""
+    scene = hovi.Scene(two_link, [hovi.effects.Gravity()])
+    found = hovi.plan(scene, [0.0, 0.0], [1.0, 0.5], 1.0, limits="none", **OPTIONS)
+    most = np.abs(found.trajectory.sample(np.linspace(0.0, 1.0, 4001)).v).max(axis=0)
+    loose, tight = (
+        hovi.Condition(f'v["{joint}"]', hovi.Between(upper=bound), name=name, **more)
+        for joint, bound, name, more in (
+            ("shoulder", 0.9 * most[0], "loose", {"tolerance": 0.2}),
+            ("elbow", 0.99 * most[1], "tight", {}),
+        )
+    )
+    asked = dataclasses.replace(found.problem, conditions=[loose, tight])  # type: ignore[type-var]
+    excess, clause = ConditionOutputs(asked).worst(found.trajectory, 1e-6)
+    assert clause.startswith("condition 'tight' reaches ")
+    assert excess == pytest.approx(0.01 * most[1] / max(1.0, 0.99 * most[1]), rel=1e-3)
 
 
 def test_two_conditions_have_two_names(scene: hovi.Scene) -> None:

@@ -45,9 +45,10 @@ class Condition(Generic[Values, Place]):
     on: hovi.Between(lower, upper) or hovi.Equal(value).
     where: hovi.AtTimes(times) for a value; left out for bounds.
     name: in messages. unit: of y, in messages. of: names of its entries there, such as joints.
-    scale: of y, one number or one for each entry: by default upper - lower, or max(1, |bound|) of a
-        single bound. Bounds that are functions of time need it.
+    scale: of bounded y, one number or one for each entry: by default upper - lower, or
+        max(1, |bound|) of a single bound. Bounds that are functions of time need it.
     tolerance: fraction of the scale by which a bound may be exceeded anywhere, at least 1e-6.
+        Values at given times have neither: they are missed by at most 1e-6.
     Raises InputError for anything else.
     """
 
@@ -71,9 +72,15 @@ class Condition(Generic[Values, Place]):
                 f"a condition needs a hovi.Between or a hovi.Equal, got {self.on!r:.200}."
             )
         _require_place(self)
-        if not (is_number(self.tolerance) and 0 < self.tolerance < np.inf):
+        if not (is_number(self.tolerance) and TOLERANCE <= self.tolerance < np.inf):
             raise InputError(
-                f"condition {self.name!r} needs a positive tolerance, not {self.tolerance!r}."
+                f"condition {self.name!r} needs a positive tolerance of at least {TOLERANCE:g}, "
+                f"not {self.tolerance!r}."
+            )
+        if isinstance(self.on, Equal) and (self.scale is not None or self.tolerance != TOLERANCE):
+            raise InputError(
+                f"condition {self.name!r} has a value, which is missed by at most 1e-6: leave its "
+                "`scale` and `tolerance` out, which are those of bounds, or use a hovi.Between."
             )
         if self.scale is not None:
             scale = numbers_of(f"the scale of condition {self.name!r}", self.scale)

@@ -373,7 +373,8 @@ def _named_conditions(
         if given:
             kept = {i: margin * (high - low) for i, (low, high) in given.items()}
             inside = {i: (low + kept[i], high - kept[i]) for i, (low, high) in given.items()}
-            condition = dataclasses.replace(make(coordinates, inside), tolerance=tolerance)
+            made, least = make(coordinates, inside), max(tolerance, TOLERANCE)
+            condition = dataclasses.replace(made, tolerance=least)
             found.append(cast(Bounded, bound(condition, coordinates)))
     return tuple(found)
 

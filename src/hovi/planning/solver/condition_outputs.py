@@ -58,8 +58,9 @@ class ConditionOutputs(PointOutputs):
         return np.concatenate(parts, axis=2)
 
     def worst(self, trajectory: Trajectory, tolerance: float) -> tuple[float, str]:
-        """The condition that is exceeded most, as a fraction of its scale."""
-        return max(ConditionBounds(each).worst(trajectory) for each in self.given)
+        """The condition that is exceeded most, as a fraction of its scale, as by `excess`."""
+        found = [(ConditionBounds(each).worst(trajectory), each.tolerance) for each in self.given]
+        return max((over - (own - tolerance), clause) for (over, clause), own in found)
 
     def expand(self, at: Points, force: Array) -> ExpandedOutputs:
         """Derivatives in (q, v, a): see the module."""

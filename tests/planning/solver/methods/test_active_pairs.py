@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from typing import Any
 
 import coal
 import numpy as np
@@ -12,16 +13,21 @@ import pytest
 
 import hovi
 from hovi import solve
+from hovi.planning.clearance.clearance_violation import near_pairs
 from hovi.planning.clearance.convex_shapes import convex_geometry
 from hovi.planning.clearance.obstacles import Obstacle
 from hovi.planning.problem.limits import as_limits
 from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.solver.methods import active_pairs
 from hovi.robot.robot import Robot
 from hovi.schemes import galerkin
+from hovi.system.deadline import OutOfTimeError
 
 Array = npt.NDArray[np.float64]
 START, GOAL, T = [-1.2, 0.4], [0.9, 0.4], 1.7
 LIMITS = {"base": "none", "v": 6.0}
+APART = [0.0, -1.2, 0.3, -0.5, 0.3, 0.1], [0.8, -0.9, 0.1, -0.2, 0.6, 0.3]
+"""Ends between which the links of a UR5 stay apart."""
 FAR = hovi.Sphere([0.0, 2.8, 0.0], 0.1, name="far")
 OUT_OF_REACH = hovi.Sphere([9.0, 0.0, 0.0], 0.1, name="out of reach")
 
@@ -60,6 +66,40 @@ def test_obstacles_far_away_leave_every_digit_of_a_motion(
     np.testing.assert_array_equal(kept.trajectory.q, free.trajectory.q)
     assert kept.nit == free.nit
     assert kept.trajectory.metadata["clearance"]["obstacles"][0]["name"] == "far"
+
+
+@pytest.mark.parametrize("of", ["an obstacle", "itself"])
+@pytest.mark.parametrize(
+    ("raised", "status"), [(KeyboardInterrupt, "interrupted"), (OutOfTimeError, "time_limit")]
+)
+def test_what_stops_the_last_check_of_distances_leaves_the_motion_found(
+    arm_scene: hovi.Scene,
+    ur5: Robot,
+    monkeypatch: pytest.MonkeyPatch,
+    of: str,
+    raised: type[BaseException],
+    status: str,
+) -> None:
+    def planned(kept: bool) -> hovi.Solution:
+        if of == "an obstacle":
+            return reach(arm_scene, [FAR] if kept else [], "none")
+        given = {"limits": "none", "self_collision": kept, "scheme": "galerkin-2", "intervals": 16}
+        return hovi.plan(hovi.Scene(ur5, [hovi.effects.Gravity()]), *APART, 1.5, **given)
+
+    free, calls = planned(kept=False), []
+
+    def stopped(*args: Any) -> Any:
+        calls.append(args)
+        if len(calls) > 1:
+            raise raised
+        return near_pairs(*args)
+
+    monkeypatch.setattr(active_pairs, "near_pairs", stopped)
+    found = planned(kept=True)
+    assert found.status.value == status
+    assert len(calls) == 2
+    assert "before the distances along the motion were checked" in found.message
+    np.testing.assert_array_equal(found.trajectory.q, free.trajectory.q)
 
 
 def test_self_collision_that_changes_nothing_leaves_every_digit(panda: Robot) -> None:

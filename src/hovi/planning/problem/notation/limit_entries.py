@@ -80,10 +80,14 @@ def _bounds(
     if not isinstance(value, str):
         return _pair(kind, name, value)
     if kind == "q" or base is None:
-        what = "a range of positions" if kind == "q" else f"the {kind}"
+        if kind != "q":
+            raise InputError(
+                f"limits.{kind} of {name!r} is {value!r}, but a base has no limit on the {kind} of "
+                "which that is a fraction: give a number, or a pair lower < upper."
+            )
         raise InputError(
-            f"limits.{kind} of {name!r} is {value!r}, and {what} has no share: give a pair lower < "
-            "upper, or a `margin`, which keeps clear of both ends of all ranges."
+            f"limits.{kind} of {name!r} is {value!r}, and a range of positions has no share: give "
+            "a pair lower < upper, or a `margin`, which keeps clear of both ends of all ranges."
         )
     fraction = _fraction(kind, name, value)
     lower, upper = float(base.lower[i]), float(base.upper[i])

@@ -8,6 +8,7 @@ from __future__ import annotations
 import copy
 import dataclasses
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 import numpy.typing as npt
@@ -100,13 +101,9 @@ class _Rounds:
             return self._solve(self._problem, self._start, self._criteria_left())
         result = self._solved(self._problem, path, chosen)
         while result.status in (Status.MINIMUM, Status.SADDLE):
-            try:
-                more = self._violating(result, chosen)
-            except KeyboardInterrupt:
-                record_interrupt()
-                return _unfinished(result, Reason.INTERRUPTED)
-            except OutOfTimeError:
-                return _unfinished(result, Reason.TIME_LIMIT)
+            more = _unless_stopped(partial(self._violating, result, chosen))
+            if isinstance(more, Reason):
+                return _unfinished(result, more)
             if len(more) == 0:
                 break
             free = len(chosen) == 0 and result.nit > 0
@@ -116,16 +113,19 @@ class _Rounds:
 
     def free(self) -> Answer | None:
         """A solve without any pair; None where one is too close, before or after it."""
+        path = self._start.x
         try:
-            path = self._start.x
             if len(self._too_close(self._problem, path, FIRST_BEYOND)) > 0:
                 return None
-            result = self._solved(self._problem, path, np.zeros(0, dtype=np.intp))
-            minimum = result.status in (Status.MINIMUM, Status.SADDLE)
-            close = minimum and len(self._too_close(result.problem, result.path)) > 0
         except OutOfTimeError:
             return None
-        return None if close else result
+        result = self._solved(self._problem, path, np.zeros(0, dtype=np.intp))
+        if result.status not in (Status.MINIMUM, Status.SADDLE):
+            return result
+        close = _unless_stopped(partial(self._too_close, result.problem, result.path))
+        if isinstance(close, Reason):
+            return _unfinished(result, close)
+        return None if len(close) > 0 else result
 
     def _violating(self, result: Answer, chosen: Index) -> Index:
         """If other pairs violate the margin: those, and the pairs that are near."""
@@ -175,6 +175,17 @@ def with_clearance(problem: TrajectoryProblem, clearance: Clearance) -> Trajecto
     object.__setattr__(other, "clearance", clearance)
     other.__dict__.pop("finer", None)
     return other
+
+
+def _unless_stopped(check: Callable[[], Index]) -> Index | Reason:
+    """What a check finds, or why it did not end: Ctrl-C or the time limit."""
+    try:
+        return check()
+    except KeyboardInterrupt:
+        record_interrupt()
+        return Reason.INTERRUPTED
+    except OutOfTimeError:
+        return Reason.TIME_LIMIT
 
 
 def _unfinished(result: Answer, why: Reason) -> Answer:
