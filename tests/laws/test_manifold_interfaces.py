@@ -23,7 +23,7 @@ from hovi.effects import Armature, Gravity
 from hovi.errors import ChartError, InputError, SceneError
 from hovi.planning.conditions.function import linear
 from hovi.planning.conditions.state_difference import StateDifference
-from hovi.planning.problem.limit_violation import excess_along
+from hovi.planning.problem.limit_conditions import closeness
 from hovi.planning.problem.limits import as_limits
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.task_file.reading import load_task
@@ -67,9 +67,9 @@ def test_limits_hold_for_continuous_joints(kinova: Robot) -> None:
     solution = plan(scene, q0, q1, 5.0, intervals=14, self_collision=False)
     assert solution.success, solution.message
     limits = as_limits(kinova, "urdf")
-    assert excess_along(solution.trajectory, limits).worst <= limits.tolerance
+    assert closeness(solution.trajectory, limits).min() >= -limits.tolerance
     free = plan(scene, q0, q1, 5.0, intervals=14, limits="none", self_collision=False)
-    assert excess_along(free.trajectory, limits).worst > 0.01
+    assert closeness(free.trajectory, limits).min() < -0.01
     assert solution.cost > free.cost
 
 

@@ -10,7 +10,7 @@ from hovi.accuracy.resolved_motion import ResolvedMotion, resolve
 from hovi.discrete.grid import Grid
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import HoviError, UnmeasurableError
-from hovi.planning.problem.limit_violation import closeness
+from hovi.planning.problem.limit_conditions import closeness
 from hovi.planning.problem.limits import as_limits
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.refinement.adaptive import MAX_FIRST_INTERVALS

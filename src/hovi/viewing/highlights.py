@@ -10,7 +10,7 @@ import pinocchio as pin
 
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError
-from hovi.planning.problem.limit_violation import at_limit
+from hovi.planning.problem.limit_conditions import at_limit
 from hovi.planning.problem.limits import KINDS
 from hovi.robot.robot import Robot
 from hovi.system.dataclass import dataclass

@@ -25,7 +25,7 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-u
 from hovi.checks.arguments import check_arguments_except
 from hovi.discrete.trajectory import Sample, Trajectory
 from hovi.errors import DisplayError, expect
-from hovi.planning.problem.limit_violation import at_limit
+from hovi.planning.problem.limit_conditions import at_limit
 from hovi.planning.problem.limits import KINDS, Limits
 from hovi.planning.solver.solver import Solution
 from hovi.robot.model import frame_named

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import hovi
-from hovi.planning.conditions.condition import bound
+from hovi.planning.conditions.condition import with_function
 from hovi.planning.conditions.function import Points
 from hovi.planning.problem.limits import as_limits
 from hovi.planning.solver.condition_outputs import ConditionOutputs
@@ -139,6 +139,6 @@ def test_a_function_of_ones_own_takes_part(ur5: hovi.Robot) -> None:
     assert (0.5 * found.trajectory.sample(t).v ** 2).sum(axis=1).max() <= most + 2e-6 * max(1, most)
 
 
-def test_conditions_are_bound_once_for_a_robot(ur5: hovi.Robot) -> None:
+def test_a_condition_gets_its_function_once_for_a_robot(ur5: hovi.Robot) -> None:
     given = hovi.Condition("tau * v", hovi.Between(-1, 1))
-    assert bound(given, ur5) is bound(given, ur5)
+    assert with_function(given, ur5) is with_function(given, ur5)

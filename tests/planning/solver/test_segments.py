@@ -17,7 +17,8 @@ from scipy.integrate import solve_bvp
 import hovi
 from hovi.discrete.state import State
 from hovi.errors import InputError
-from hovi.planning.problem.limit_violation import closeness, excess_along
+from hovi.planning.conditions.excess import excess_along
+from hovi.planning.problem.limit_conditions import LimitRange, closeness, limit_conditions
 from hovi.planning.problem.limits import Limits, as_limits
 from hovi.planning.problem.presolve.end_torques import static_sentence
 from hovi.scene.casadi_lagrangian import CasadiLagrangian
@@ -265,7 +266,11 @@ def test_an_end_outside_the_limits_of_its_segment_is_named() -> None:
 def test_limits_are_checked_in_each_segment_against_its_own() -> None:
     motion = lifted().trajectory
     parts = [bounds(v=[1.2, 9.0], tau=[30.0, 4.4]), bounds(v=[1.5, 4.0], tau=[4.0, 7.5])]
-    found = excess_along(motion, Limits.of_segments(parts, (0.6,)))
+    limits = Limits.of_segments(parts, (0.6,))
+    lower, upper = np.full((2, motion.grid.intervals, 4, 2), -np.inf)
+    for each in limit_conditions(limits, motion.grid.order, None):
+        assert isinstance(each.on, LimitRange)
+        lower[:, each.on.row], upper[:, each.on.row] = excess_along(motion, each).sides
     t = np.linspace(0.0, 1.0, 20_001)
     for segment, span in zip(parts, (slice(0, 6), slice(6, 15)), strict=True):
         for k in range(span.start, span.stop):
@@ -274,7 +279,7 @@ def test_limits_are_checked_in_each_segment_against_its_own() -> None:
                 ranges = 2 * np.maximum(parts[0].upper[row], parts[1].upper[row])
                 above = ((values - segment.upper[row]) / ranges).max(axis=0)
                 below = ((segment.lower[row] - values) / ranges).max(axis=0)
-                for dense, side in ((above, found.upper), (below, found.lower)):
+                for dense, side in ((above, upper), (below, lower)):
                     near = dense > -1e-3
                     np.testing.assert_allclose(side[k, row][near], dense[near], atol=1e-6)
                     assert (side[k, row][~near] < -5e-4).all()

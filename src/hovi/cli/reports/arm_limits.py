@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from hovi.planning.problem.arms.limit_set import KIND_NAMES, LimitSet, is_limit_set, limit_set
+from hovi.planning.conditions.joint_quantity import QUANTITIES
+from hovi.planning.problem.arms.limit_set import LimitSet, is_limit_set, limit_set
 from hovi.planning.task_file.task import Task
 
 
@@ -48,5 +49,5 @@ def source_lines(arm: LimitSet) -> list[str]:
 
 
 def _words(kinds: Iterable[str]) -> str:
-    words = [KIND_NAMES[kind] for kind in kinds]
+    words = [QUANTITIES[kind] for kind in kinds]
     return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"

@@ -7,14 +7,11 @@ from dataclasses import field
 from typing import Any
 
 from hovi.discrete.trajectory import Trajectory
-from hovi.planning.clearance.clearance import Clearance
-from hovi.planning.clearance.distances import Distances
+from hovi.planning.clearance import clearance_violation
 from hovi.planning.problem.limits import Limits
-from hovi.planning.solver.requirements import distances
-from hovi.planning.solver.requirements import limit_margins as limited
-from hovi.planning.solver.requirements.distances import Apart
-from hovi.planning.solver.requirements.limit_margins import LimitMargins
-from hovi.planning.solver.requirements.requirements_of import requirements_between_ends
+from hovi.planning.solver.outcome import limit_margins as limited
+from hovi.planning.solver.outcome.limit_margins import LimitMargins
+from hovi.planning.solver.outcome.margins import margins_to_bounds, margins_to_obstacles
 from hovi.planning.solver.solver import Solution
 from hovi.planning.solver.status import Status
 from hovi.system.dataclass import dataclass
@@ -29,8 +26,12 @@ def limit_margins(motion: Solution | Trajectory) -> LimitMargins | None:
 
 def nearest_pair(motion: Solution | Trajectory) -> tuple[float | None, str | None]:
     """The least distance of any pair, in [m], and that pair; None for a plan without obstacles."""
-    kept = _distances_of(motion)
-    return (None, None) if kept is None else distances.nearest_pair(_trajectory_of(motion), *kept)
+    if isinstance(motion, Solution) and motion.problem is not None:
+        known = margins_to_obstacles(motion.problem, motion.trajectory)
+        return known.get("distance"), known.get("nearest_pair")
+    trajectory = _trajectory_of(motion)
+    kept = kept_distances(trajectory)
+    return (None, None) if kept is None else clearance_violation.nearest_pair(trajectory, *kept)
 
 
 @dataclass(frozen=True)
@@ -60,15 +61,14 @@ class KnownMargins:
         if is_guess(solution):
             return cls(missing="there is no motion, only a guess")
         motion, problem = solution.trajectory, solution.problem
-        asked = [] if problem is None else [*requirements_between_ends(problem)]
+        if problem is None:
+            return cls()
         known, violation = dict[str, Any](), None
         try:
             with deadline.in_force():
-                for each in asked:
-                    known |= {} if isinstance(each, Apart) else each.margins(motion)
-                violation = None if problem is None else solution.violation
-                for each in asked:
-                    known |= each.margins(motion) if isinstance(each, Apart) else {}
+                known |= margins_to_bounds(problem, motion)
+                violation = solution.violation
+                known |= margins_to_obstacles(problem, motion)
                 return cls(**known, violation=violation)
         except OutOfTimeError as late:
             return cls(**known, violation=violation, missing=str(late))
@@ -88,10 +88,3 @@ def _limits_of(motion: Solution | Trajectory) -> Limits | None:
     if isinstance(motion, Solution) and motion.problem is not None:
         return motion.problem.limits
     return imposed_limits(_trajectory_of(motion))
-
-
-def _distances_of(motion: Solution | Trajectory) -> tuple[Clearance, Distances] | None:
-    """The clearance and distances of the solved problem, or those that the motion records."""
-    if not isinstance(motion, Solution) or motion.problem is None:
-        return kept_distances(_trajectory_of(motion))
-    return distances.all_distances(motion.problem)

@@ -19,7 +19,7 @@ from hovi.discrete.measures.motion_extremes import extremes
 from hovi.discrete.output.caution import STATUS, WARNED, cautions_of
 from hovi.errors import some_of
 from hovi.planning.refinement.certificate import Certificate
-from hovi.planning.solver.requirements.limit_margins import LimitMargins
+from hovi.planning.solver.outcome.limit_margins import LimitMargins
 from hovi.planning.solver.solver import Solution
 from hovi.planning.solver.status import Status
 from hovi.planning.task_file.task import Task

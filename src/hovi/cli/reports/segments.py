@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from hovi.discrete.measures.motion_segments import MotionSegment, motion_segments
-from hovi.planning.solver.requirements.limit_margins import LimitMargins
+from hovi.planning.solver.outcome.limit_margins import LimitMargins
 from hovi.planning.solver.solver import Solution
 
 

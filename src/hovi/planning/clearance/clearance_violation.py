@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import numpy.typing as npt
 
 from hovi.discrete.trajectory import Trajectory
-from hovi.planning.clearance.clearance import DISTANCE_SCALE
+from hovi.planning.clearance.clearance import DISTANCE_SCALE, Clearance
 from hovi.planning.clearance.distances import Distances
 from hovi.planning.clearance.fast_obstacles import FastPairs
 from hovi.system.dataclass import dataclass
@@ -58,6 +60,16 @@ def closest_along(trajectory: Trajectory, distances: Distances, least: float) ->
     nearest, at = _nearest(*_sampled(trajectory, distances, np.inf))
     first = float((nearest - distances.allowance).min())
     return _refined(trajectory, distances, nearest, at, max(least, first) + REFINEMENT_DISTANCE)
+
+
+def nearest_pair(
+    motion: Trajectory, clearance: Clearance, distances: Distances
+) -> tuple[float, str]:
+    """The least distance, in [m], which may be smaller where shapes may touch, and its pair."""
+    approach = closest_along(motion, distances, clearance.margin)
+    closest = (approach.distance - distances.allowance).min(axis=0)
+    pair = int(np.argmin(closest))
+    return float(closest[pair]), str(dataclasses.replace(distances.pairs[pair], touching=False))
 
 
 def near_pairs(trajectory: Trajectory, distances: Distances, least: float) -> npt.NDArray[np.intp]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from hovi.discrete.grid import Grid
 from hovi.errors import InputError
-from hovi.planning.conditions.condition import Bounded, Condition, Equation, bound
+from hovi.planning.conditions.condition import Condition, Equation, Inequality, with_function
 from hovi.planning.conditions.places import AtNode, AtTimes
 from hovi.planning.conditions.sets import Between
 from hovi.robot.space.coordinates import Coordinates
@@ -32,8 +32,8 @@ def as_conditions(given: Any) -> tuple[Condition[Any, Any], ...]:
 
 
 def checked(given: Any, coordinates: Coordinates) -> tuple[Condition[Any, Any], ...]:
-    """The conditions with functions of a robot's coordinates. Raises InputError as `bound`."""
-    return tuple(bound(each, coordinates) for each in as_conditions(given))
+    """The conditions, each `with_function` of a robot's coordinates, whose errors it raises."""
+    return tuple(with_function(each, coordinates) for each in as_conditions(given))
 
 
 def asked_at_nodes(given: Given, grid: Grid) -> tuple[Equation, ...]:
@@ -59,11 +59,11 @@ def times_of(given: Given) -> list[float]:
     return [float(time) for place in places for time in np.asarray(place.times)]
 
 
-def bounded_of(given: Given) -> tuple[Bounded, ...]:
+def bounded_of(given: Given) -> tuple[Inequality, ...]:
     """Those that hold at all times."""
     return tuple(each for each in given if isinstance(each.on, Between))
 
 
-def need_torques(bounded: Sequence[Bounded]) -> bool:
+def need_torques(bounded: Sequence[Inequality]) -> bool:
     """Whether one of them depends on torques."""
     return any("tau" in each.y.needs for each in bounded)

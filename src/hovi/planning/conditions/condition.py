@@ -17,13 +17,13 @@ from hovi.discrete.grid import DiscretePath
 from hovi.errors import InputError
 from hovi.planning.conditions.expression import Given, function_of
 from hovi.planning.conditions.function import Function, at_state, bend, linear
-from hovi.planning.conditions.places import AtNode, AtPoints, AtTimes, Where
-from hovi.planning.conditions.sets import Between, Equal
+from hovi.planning.conditions.places import Along, AtNode, AtPoints, AtTimes, Where
+from hovi.planning.conditions.sets import Between, Equal, Range
 from hovi.robot.space.coordinates import Coordinates
 from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
-Values = TypeVar("Values", bound=Equal | Between, covariant=True)
+Values = TypeVar("Values", bound=Equal | Range, covariant=True)
 Place = TypeVar("Place", bound=Where, covariant=True)
 
 TOLERANCE = 1e-6
@@ -67,7 +67,7 @@ class Condition(Generic[Values, Place]):
                 "the function of a condition must be a formula, a function of CasADi symbols or a "
                 f"Function, got {self.function!r}."
             )
-        if not isinstance(self.on, Equal | Between):
+        if not isinstance(self.on, Equal | Range):
             raise InputError(
                 f"a condition needs a hovi.Between or a hovi.Equal, got {self.on!r:.200}."
             )
@@ -88,7 +88,7 @@ class Condition(Generic[Values, Place]):
                 raise InputError(
                     f"the scale of condition {self.name!r} must be positive, got {self.scale!r}."
                 )
-        elif isinstance(self.on, Between) and self.on.varies:
+        elif isinstance(self.on, Range) and self.on.varies:
             raise InputError(
                 f"condition {self.name!r} has bounds that are functions of time and needs a "
                 "`scale`: the size of its values that counts as large."
@@ -96,24 +96,24 @@ class Condition(Generic[Values, Place]):
 
     @property
     def y(self) -> Function:
-        """The function; of a condition that is `bound`."""
+        """The function; of a condition `with_function`."""
         assert isinstance(self.function, Function)
         return self.function
 
     @property
     def timed(self) -> bool:
-        """Whether it changes with time, whatever the motion; of a condition that is `bound`."""
-        return "t" in self.y.needs or (isinstance(self.on, Between) and self.on.varies)
+        """Whether it changes with time, whatever the motion; of a condition `with_function`."""
+        return "t" in self.y.needs or (isinstance(self.on, Range) and self.on.varies)
 
 
 def _require_place(given: Condition[Any, Any]) -> None:
     """Raise InputError for sets at places that are not supported."""
-    if isinstance(given.on, Equal) and not isinstance(given.where, AtNode | AtTimes):
+    if isinstance(given.on, Equal) and not isinstance(given.where, AtNode | AtTimes | Along):
         raise InputError(
             f"condition {given.name!r} is an equation along the whole motion, which is not "
             "supported: use `where = hovi.AtTimes(...)`, or a hovi.Between with some room."
         )
-    if isinstance(given.on, Between) and not isinstance(given.where, AtPoints):
+    if isinstance(given.on, Range) and isinstance(given.where, AtNode | AtTimes | Along):
         raise InputError(
             f"condition {given.name!r} has bounds, which hold at all times: leave `where` out."
         )
@@ -121,12 +121,12 @@ def _require_place(given: Condition[Any, Any]) -> None:
 
 Equation = Condition[Equal, AtNode]
 """c(q, v) = value at a node."""
-Bounded = Condition[Between, AtPoints]
+Inequality = Condition[Between, AtPoints]
 """lower <= y(q, v, a, tau, t) <= upper at all times."""
 
 
 @lru_cache(maxsize=256)
-def bound(
+def with_function(
     given: Condition[Equal | Between, Where], coordinates: Coordinates
 ) -> Condition[Equal | Between, Where]:
     """The condition with its function of a robot's coordinates.
@@ -163,7 +163,7 @@ def _require_size(
         )
 
 
-def scales(each: Bounded) -> Array:
+def scales(each: Condition[Range, Any]) -> Array:
     """The scale of every entry, shape (size,): as given, or the range between the bounds."""
     if each.scale is not None:
         return np.broadcast_to(np.asarray(each.scale, dtype=float), (each.y.size,))

@@ -25,8 +25,9 @@ ARGUMENTS = "q", "v", "a", "tau", "t"
 class Points:
     """A motion at P instants, of which a Function returns its values.
 
-    q: configurations, shape (P, nq). v: velocities, (P, nv). t: times, (P,), in [s]. a, tau:
-    accelerations and joint torques, (P, nv); None where no function needs them.
+    q: configurations, shape (P, nq). v: velocities, (P, nv). t: times, (P,), in [s]. a, tau, jerk,
+    torque_rate: accelerations, joint torques, and the rates of both, (P, nv); None where no
+    function needs them.
     """
 
     q: Array
@@ -34,9 +35,11 @@ class Points:
     t: Array
     a: Array | None = None
     tau: Array | None = None
+    jerk: Array | None = None
+    torque_rate: Array | None = None
 
     def argument(self, name: str) -> Array:
-        """One of q, v, a, tau and t by its name, shape (P, number of entries)."""
+        """One of its fields by its name, shape (P, number of entries)."""
         found = getattr(self, name)
         assert found is not None
         return np.asarray(found.reshape(len(self.q), -1))
@@ -78,6 +81,10 @@ class Function(ABC):
         weights: w, shape (P, size).
         """
         return {}
+
+    def named(self, entry: int) -> tuple[str, str] | None:
+        """What an entry of y is called in sentences, and its unit; None if the condition says."""
+        return None
 
     def is_spurious(self, at: Points) -> bool:
         """Whether y has its value at a root where what is meant does not hold."""

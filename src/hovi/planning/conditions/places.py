@@ -50,4 +50,19 @@ class AtPoints:
     """At all times: bounds at the quadrature points, tightened where they do not hold between."""
 
 
-Where = AtNode | AtTimes | AtPoints
+@dataclass(frozen=True)
+class ControlPoints:
+    """At all times: bounds of what is linear in the unknowns, by control points of the motion."""
+
+
+@dataclass(frozen=True)
+class Exchange:
+    """At all times: bounds at instants that are added where the motion exceeds them."""
+
+
+@dataclass(frozen=True)
+class Along:
+    """At all times: equations, in as many moments of an interval as it has unknowns for them."""
+
+
+Where = AtNode | AtTimes | AtPoints | ControlPoints | Exchange | Along

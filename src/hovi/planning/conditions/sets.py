@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 
 import numpy as np
@@ -39,9 +40,25 @@ class Equal:
         return np.asarray(y - np.asarray(self.value))
 
 
+class Range(ABC):
+    """What is between two bounds, which may change with time."""
+
+    @property
+    def varies(self) -> bool:
+        """Whether a bound is a function of time."""
+        return False
+
+    @abstractmethod
+    def at(self, t: Array, size: int | None, within: Array | None = None) -> tuple[Array, Array]:
+        """Lower and upper bounds at times, (P, size) each; one column, or as given, for size None.
+
+        within: a time inside the interval of each, by which seams are in one of two segments.
+        """
+
+
 @check_arguments
 @dataclass(frozen=True, eq=False)
-class Between:
+class Between(Range):
     """lower <= y <= upper.
 
     lower, upper: a number, one for each entry of y, or a function of the time that returns either;
@@ -75,8 +92,8 @@ class Between:
         """Whether a bound is a function of time."""
         return callable(self.lower) or callable(self.upper)
 
-    def at(self, t: Array, size: int | None) -> tuple[Array, Array]:
-        """Lower and upper bounds at times, (P, size) each; one column, or as given, for size None.
+    def at(self, t: Array, size: int | None, within: Array | None = None) -> tuple[Array, Array]:
+        """See Range.
 
         Raises InputError for another number of bounds than size, and for bounds that are NaN.
         """

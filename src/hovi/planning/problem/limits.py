@@ -14,10 +14,11 @@ from hovi.checks.arguments import check_arguments, check_arguments_except
 from hovi.checks.kinds import shown
 from hovi.checks.shapes import require_shape
 from hovi.errors import InputError, nearest, warn
-from hovi.planning.conditions.condition import Bounded, bound
+from hovi.planning.conditions.condition import Inequality, with_function
+from hovi.planning.conditions.joint_quantity import QUANTITIES
 from hovi.planning.conditions.named import NAMED
-from hovi.planning.problem.arms.limit_set import KIND_NAMES, OF_ORDER_3, is_limit_set, limit_set
 from hovi.planning.problem.arms.limit_set import NAMES as ARMS
+from hovi.planning.problem.arms.limit_set import OF_ORDER_3, is_limit_set, limit_set
 from hovi.planning.problem.arms.urdf_ranges import position_ranges, require_ranges
 from hovi.planning.problem.notation.limit_entries import Base, entries, number_in
 from hovi.planning.problem.notation.summaries import LimitsSummary
@@ -30,7 +31,7 @@ from hovi.system.dataclass import dataclass
 Array = npt.NDArray[np.float64]
 Range = tuple[Array, Array]
 
-KINDS = tuple(KIND_NAMES)
+KINDS = tuple(QUANTITIES)
 """The limited quantities, in the order of the rows of Limits."""
 NAMES = "urdf", "soft", "none", *ARMS
 """Limits that have a name."""
@@ -71,7 +72,7 @@ class Limits(LimitsSummary):
     strict: bool = False
     window: float = WINDOW
     excused: tuple[Excused, ...] = ()
-    conditions: tuple[Bounded, ...] = ()
+    conditions: tuple[Inequality, ...] = ()
 
     def __post_init__(self) -> None:
         few = self.lower.shape[:1] == (FIRST_KINDS,)
@@ -81,7 +82,7 @@ class Limits(LimitsSummary):
             raise InputError("a limit is not a number; use -inf or inf for no bound.")
         for k, i in np.argwhere(self._empty):
             raise InputError(
-                f"the {KIND_NAMES[KINDS[k]]} range of joint coordinate {i} is empty: "
+                f"the {QUANTITIES[KINDS[k]]} range of joint coordinate {i} is empty: "
                 f"[{self.lower[k, i]:g}, {self.upper[k, i]:g}]; lower must be less than upper."
             )
         if not (np.isfinite(self.tolerance) and self.tolerance > 0):
@@ -126,11 +127,14 @@ class Limits(LimitsSummary):
 
         nodes: their times, shape (N + 1,), in [s].
         """
+        require_shape("nodes", nodes, None)
+        return self.at(nodes[1:] / 2 + nodes[:-1] / 2)
+
+    def at(self, t: Array) -> Range:
+        """The same at times inside of segments, (P or 1, kinds, nv)."""
         if not self.parts:
             return self.lower[None], self.upper[None]
-        require_shape("nodes", nodes, None)
-        middle = nodes[1:] / 2 + nodes[:-1] / 2
-        part = np.searchsorted(np.array(self.ends), middle)
+        part = np.searchsorted(np.array(self.ends), t)
         lower, upper = (np.stack([getattr(p, x) for p in self.parts]) for x in ("lower", "upper"))
         return lower[part], upper[part]
 
@@ -365,7 +369,7 @@ def as_limits(
 
 def _named_conditions(
     coordinates: Coordinates, limits: Mapping[str, Any], margin: float, tolerance: float
-) -> tuple[Bounded, ...]:
+) -> tuple[Inequality, ...]:
     """The conditions that have a key in a mapping. Raises InputError as `entries`."""
     found = []
     for name, make in NAMED.items():
@@ -375,7 +379,7 @@ def _named_conditions(
             inside = {i: (low + kept[i], high - kept[i]) for i, (low, high) in given.items()}
             made, least = make(coordinates, inside), max(tolerance, TOLERANCE)
             condition = dataclasses.replace(made, tolerance=least)
-            found.append(cast(Bounded, bound(condition, coordinates)))
+            found.append(cast(Inequality, with_function(condition, coordinates)))
     return tuple(found)
 
 

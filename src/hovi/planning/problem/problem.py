@@ -25,7 +25,7 @@ from hovi.planning.clearance.clearance import Clearance
 from hovi.planning.clearance.distances import Distances
 from hovi.planning.clearance.within_reach import distances_within_reach, with_gaps
 from hovi.planning.conditions.asked import asked_at_nodes, bounded_of, checked
-from hovi.planning.conditions.condition import Bounded, Condition, Equation, equation
+from hovi.planning.conditions.condition import Condition, Equation, Inequality, equation
 from hovi.planning.problem.conserved_momentum import free_fall_contradiction, without_redundancy
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.goals import Via, goal_state
@@ -343,7 +343,7 @@ class TrajectoryProblem(ProblemSummary):
         return bool(self.free_ends.any())
 
     @property
-    def bounds(self) -> tuple[Bounded, ...]:
+    def bounds(self) -> tuple[Inequality, ...]:
         """The conditions that hold at all times, those of the limits included."""
         of_limits = () if self.limits is None else self.limits.conditions
         return (*bounded_of(self.conditions), *of_limits)

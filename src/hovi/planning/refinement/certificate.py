@@ -15,7 +15,7 @@ from hovi.discrete.measures.motion_error import MotionError, relative_difference
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError, expect
 from hovi.flows.execution.dynamics_replay import DynamicsReplay, replay_dynamics
-from hovi.planning.problem.limit_violation import excess_along
+from hovi.planning.problem.limit_conditions import closeness
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.refinement.error_estimate import estimate_error
 from hovi.planning.refinement.nodal_hamiltonian import NodalHamiltonian, nodal_hamiltonian
@@ -155,7 +155,7 @@ def _upper_bound(solution: Solution, problem: TrajectoryProblem, integral: Curve
     if problem.distances is not None:
         raise InputError("the distances along the curve are known to a tolerance only")
     if problem.limits is not None and problem.limited:
-        excess = excess_along(solution.trajectory, problem.limits).worst
+        excess = -float(closeness(solution.trajectory, problem.limits).min())
         if excess > problem.limits.tolerance:
             raise InputError(f"the curve exceeds a limit by {excess:.1e} of its range")
     return integral.upper_bound

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 
-from hovi.planning.problem.limit_violation import closeness
+from hovi.planning.problem.limit_conditions import closeness
 from hovi.planning.problem.limits import Limits
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.solver import Solution

@@ -13,9 +13,9 @@ import numpy.typing as npt
 from hovi.discrete.trajectory import Trajectory
 from hovi.planning.conditions.asked import need_torques
 from hovi.planning.conditions.condition import scales
+from hovi.planning.conditions.excess import excess_of, worst
 from hovi.planning.conditions.function import Curvature, Points, Slopes
 from hovi.planning.problem.problem import TrajectoryProblem
-from hovi.planning.solver.condition_excess import ConditionBounds
 from hovi.planning.solver.point_outputs import ExpandedOutputs, PointOutputs, Range
 
 Array = npt.NDArray[np.float64]
@@ -54,12 +54,12 @@ class ConditionOutputs(PointOutputs):
 
     def excess(self, trajectory: Trajectory, tolerance: float) -> Array:
         """See PointOutputs: with the conditions' own tolerances."""
-        parts = [ConditionBounds(each).excess(trajectory, tolerance) for each in self.given]
+        parts = [excess_of(trajectory, each) - (each.tolerance - tolerance) for each in self.given]
         return np.concatenate(parts, axis=2)
 
     def worst(self, trajectory: Trajectory, tolerance: float) -> tuple[float, str]:
         """The condition that is exceeded most, as a fraction of its scale, as by `excess`."""
-        found = [(ConditionBounds(each).worst(trajectory), each.tolerance) for each in self.given]
+        found = [(worst(trajectory, each), each.tolerance) for each in self.given]
         return max((over - (own - tolerance), clause) for (over, clause), own in found)
 
     def expand(self, at: Points, force: Array) -> ExpandedOutputs:

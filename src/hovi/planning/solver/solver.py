@@ -35,6 +35,7 @@ from hovi.planning.solver.longer_way_back import minimized
 from hovi.planning.solver.methods.choice import method_for
 from hovi.planning.solver.methods.method import Method, Report
 from hovi.planning.solver.methods.stationary import Stationary
+from hovi.planning.solver.outcome.ends import starts_there
 from hovi.planning.solver.outcome.judge import judged
 from hovi.planning.solver.outcome.solution_summary import SolutionSummary
 from hovi.planning.solver.receding.braking import BRAKES, braking
@@ -52,7 +53,6 @@ from hovi.planning.solver.receding.last_motion import (
     out_of_time,
     satisfies,
 )
-from hovi.planning.solver.requirements.ends import starts_there
 from hovi.planning.solver.status import Status, unfinished
 from hovi.planning.solver.warm_start import follow
 from hovi.scene.lagrangian import PointTerms

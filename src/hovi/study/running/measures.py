@@ -10,8 +10,8 @@ import numpy.typing as npt
 
 from hovi.discrete.output.caution import caution_lines
 from hovi.discrete.trajectory import Trajectory
-from hovi.planning.problem.limit_violation import closeness
-from hovi.planning.solver.requirements.distances import all_distances, least_distance
+from hovi.planning.problem.limit_conditions import closeness
+from hovi.planning.solver.outcome.margins import margins_to_obstacles
 from hovi.planning.solver.solver import Solution
 from hovi.planning.solver.status import Status
 from hovi.study.storage.rows import PlanRow
@@ -78,8 +78,10 @@ def _margin(solution: Solution) -> float | None:
 
 
 def _least_distance(solution: Solution) -> float | None:
-    bounded = None if solution.problem is None else all_distances(solution.problem)
-    return None if bounded is None else _finite(least_distance(solution.trajectory, *bounded))
+    if solution.problem is None:
+        return None
+    known = margins_to_obstacles(solution.problem, solution.trajectory)
+    return _finite(known.get("distance"))
 
 
 def _finite(number: Any) -> float | None:

@@ -25,7 +25,7 @@ from hovi.discrete.trajectory import Trajectory
 from hovi.errors import DisplayError, HoviError
 from hovi.flows.execution.dynamics_replay import DynamicsReplay, replay_dynamics
 from hovi.planning.clearance.clearance_violation import closest_along
-from hovi.planning.problem.limit_violation import closeness
+from hovi.planning.problem.limit_conditions import closeness
 from hovi.planning.problem.limits import KINDS
 from hovi.scene.scene import Scene
 from hovi.system.deadline import Deadline, OutOfTimeError

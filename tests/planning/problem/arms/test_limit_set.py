@@ -14,8 +14,9 @@ import pytest
 
 import hovi
 from hovi.errors import InputError
+from hovi.planning.conditions.joint_quantity import QUANTITIES
 from hovi.planning.problem.arms import limit_set as module
-from hovi.planning.problem.arms.limit_set import KIND_NAMES, NAMES, LimitSet, limit_set
+from hovi.planning.problem.arms.limit_set import NAMES, LimitSet, limit_set
 from hovi.planning.problem.limits import KINDS, as_limits, urdf_limits
 from hovi.robot.robot import Robot
 from samples.manifold_robots import chain
@@ -59,7 +60,7 @@ def test_every_kind_is_confirmed_by_a_source_of_the_maker(arm: LimitSet) -> None
 def test_every_joint_has_a_sane_range_of_every_kind(arm: LimitSet) -> None:
     largest = {"q": 7.0, "v": 7.0, "a": 25.0, "tau": 400.0, "jerk": 1e4, "torque_rate": 1e3}
     smallest = {"q": 0.05, "v": 0.5, "a": 0.3, "tau": 5.0, "jerk": 400.0, "torque_rate": 900.0}
-    assert {"q", "v"} <= set(arm.limits) <= set(KIND_NAMES)
+    assert {"q", "v"} <= set(arm.limits) <= set(QUANTITIES)
     for kind, pairs in arm.limits.items():
         assert len(pairs) == len(arm.joints)
         for low, high in pairs:
@@ -79,9 +80,9 @@ def test_joints_have_distinct_names(arm: LimitSet) -> None:
 
 @every_set
 def test_what_is_not_published_is_said(arm: LimitSet) -> None:
-    assert set(arm.unpublished) == set(KIND_NAMES) - set(arm.limits)
+    assert set(arm.unpublished) == set(QUANTITIES) - set(arm.limits)
     for kind in arm.unpublished:
-        words = {"a": "acceleration"}.get(kind, KIND_NAMES[kind])
+        words = {"a": "acceleration"}.get(kind, QUANTITIES[kind])
         assert words in arm.note.lower()
 
 
@@ -167,7 +168,7 @@ def test_a_set_is_the_base_of_other_limits(panda: Robot) -> None:
 def test_continuous_joints_have_no_position_limits() -> None:
     robot = hovi.load_robot("kinova")
     bounds = limit_set("j2s6s200").on(robot)
-    assert set(bounds) == set(KIND_NAMES)
+    assert set(bounds) == set(QUANTITIES)
     free = [joint for joint, (low, high) in bounds["q"].items() if low == -high == -np.inf]
     assert free == [f"j2s6s200_joint_{i}" for i in (1, 4, 6)]
 

@@ -10,7 +10,7 @@ from hovi import solve
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import Grid
 from hovi.discrete.state import State
-from hovi.planning.problem.limit_violation import excess_along
+from hovi.planning.problem.limit_conditions import closeness
 from hovi.planning.problem.limits import as_limits
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.scene.scene import Scene
@@ -31,12 +31,12 @@ def test_limits_hold_between_the_points_of_a_coarse_grid(
     """Those of a replanned motion as well, whose intervals may have to be halved."""
     limits = as_limits(arm_scene.robot, {"base": "none", "tau": tau})
     free = solve(problem_of(arm_scene, None, intervals))
-    assert excess_along(free.trajectory, limits).worst > 1e-3
+    assert closeness(free.trajectory, limits).min() < -1e-3
     found = solve(problem_of(arm_scene, tau, intervals))
     moved = found.replan(goal=State(np.add(REACH_Q, 0.05), REACH_V))
     for motion in (found, moved):
         assert motion.success, motion.message
-        assert excess_along(motion.trajectory, limits).worst <= limits.tolerance
+        assert closeness(motion.trajectory, limits).min() >= -limits.tolerance
 
 
 def test_a_solve_from_a_motion_on_a_finer_grid_stays_near_it() -> None:

@@ -13,6 +13,7 @@ from typing import Any, Literal, get_args
 
 from hovi.checks.arguments import check_arguments
 from hovi.errors import InputError, nearest
+from hovi.planning.conditions.joint_quantity import QUANTITIES
 from hovi.robot.robot import Robot
 from hovi.robot.space.coordinates import Coordinates
 from hovi.system.dataclass import dataclass
@@ -41,15 +42,6 @@ LimitSetName = Literal[
 NAMES: tuple[str, ...] = get_args(LimitSetName)
 """The names of all sets, which are those of the files."""
 
-KIND_NAMES = {
-    "q": "position",
-    "v": "velocity",
-    "a": "acceleration",
-    "tau": "torque",
-    "jerk": "jerk",
-    "torque_rate": "torque rate",
-}
-"""The kinds of limits, in the order of the rows of `Limits`, and their names in messages."""
 OF_ORDER_3 = ("jerk", "torque_rate")
 """Kinds that only apply to motions of order 3: with order 2 the jerk jumps."""
 
@@ -92,7 +84,7 @@ class LimitSet:
     @property
     def unpublished(self) -> tuple[str, ...]:
         """The kinds without limits."""
-        return tuple(kind for kind in KIND_NAMES if kind not in self.limits)
+        return tuple(kind for kind in QUANTITIES if kind not in self.limits)
 
     @check_arguments
     def beyond(self, order: int) -> tuple[str, ...]:
@@ -112,7 +104,7 @@ class LimitSet:
         plain = set(coordinates.space.plain[1].tolist())
         names = coordinates.coordinate_names
         found: dict[str, dict[str, Pair]] = {}
-        for kind in KIND_NAMES:
+        for kind in QUANTITIES:
             pairs = self.limits.get(kind, (FREE,) * len(self.joints))
             found[kind] = {joint: pairs[i] for i, joint in places.items()}
             if kind == "q":

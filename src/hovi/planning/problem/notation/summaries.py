@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from hovi.planning.problem.arms.limit_set import KIND_NAMES
+from hovi.planning.conditions.joint_quantity import QUANTITIES
 from hovi.system.summary import Summarized, Summary
 
 Array = npt.NDArray[np.float64]
@@ -22,7 +22,7 @@ class LimitsSummary(Summarized):
     def _summary(self) -> Summary:
         rows = [
             (kind, ", ".join(_range(*pair) for pair in zip(low, high, strict=True)))
-            for kind, low, high in zip(KIND_NAMES, self.lower, self.upper, strict=False)
+            for kind, low, high in zip(QUANTITIES, self.lower, self.upper, strict=False)
             if np.isfinite(low).any() or np.isfinite(high).any()
         ]
         title = "Limits" if rows else "Limits: none"

@@ -12,12 +12,12 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.errors import InputError
-from hovi.planning.problem.arms.limit_set import KIND_NAMES
+from hovi.planning.conditions.joint_quantity import QUANTITIES
 from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 
-KINDS = tuple(KIND_NAMES)
+KINDS = tuple(QUANTITIES)
 MOST_POWERS = 4
 """Number of coefficients of a polynomial at most: of the third degree for positions of order 3."""
 
@@ -46,7 +46,7 @@ class Excused:
     def __str__(self) -> str:
         """Which limit is exceeded by how much, and until when, as a clause."""
         return (
-            f"the {KIND_NAMES[self.limit]} of joint {self.joint!r} by up to {self.excess:.3g} "
+            f"the {QUANTITIES[self.limit]} of joint {self.joint!r} by up to {self.excess:.3g} "
             f"until {self.until:.3g} s"
         )
 

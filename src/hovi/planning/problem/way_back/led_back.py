@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from hovi.planning.problem.arms.limit_set import KIND_NAMES
+from hovi.planning.conditions.joint_quantity import QUANTITIES
 from hovi.planning.problem.limits import KINDS
 from hovi.planning.problem.way_back.end_state import SHORTEST, STRIDE, EndState, Over
 from hovi.planning.problem.way_back.excused import Excused
@@ -85,7 +85,7 @@ def _refusal(end: EndState, over: Over, name: str, direction: int, most: str = "
     joint, units = end.coordinates.coordinate_names[i], end.coordinates.coordinate_units[i]
     value = end.bound(over) + over.side * over.now
     lower, upper = end.limits.lower[kind, i], end.limits.upper[kind, i]
-    what = f"the {KIND_NAMES[KINDS[kind]]} of joint {joint!r} at the {name} is {value:.6g}"
+    what = f"the {QUANTITIES[KINDS[kind]]} of joint {joint!r} at the {name} is {value:.6g}"
     if over.now > end.slack(over):
         slip = beyond_in_degrees(value, lower, upper) if kind == 0 and units[0] == "rad" else ""
         return f"{what} {units[kind]}, outside its limits [{lower:.6g}, {upper:.6g}]" + (
@@ -94,7 +94,7 @@ def _refusal(end: EndState, over: Over, name: str, direction: int, most: str = "
     rate, order = next((x, j) for j, x in enumerate(over.rates, 1) if x > 0.0)
     leaves = "takes it beyond" if direction > 0 else "means that it came from beyond"
     return (
-        f"{what} {units[kind]}, and its {KIND_NAMES[KINDS[kind + order]]} of "
+        f"{what} {units[kind]}, and its {QUANTITIES[KINDS[kind + order]]} of "
         f"{over.side * direction**order * rate:.6g} {units[kind + order]} {leaves} its limit of "
         f"{end.bound(over):.6g}{most}; change the {name} or widen the limits"
     )

@@ -18,8 +18,8 @@ from hovi.discrete.output.caution import (
     with_cautions,
 )
 from hovi.errors import HoviError, recorded_warnings
-from hovi.planning.problem.arms.limit_set import KIND_NAMES
-from hovi.planning.problem.limit_violation import excess_along
+from hovi.planning.conditions.joint_quantity import QUANTITIES
+from hovi.planning.problem.limit_conditions import closeness
 from hovi.planning.problem.limits import KINDS, urdf_limits
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.refinement.faults.on_curve import (
@@ -110,15 +110,14 @@ def _of_limits(solution: Solution, problem: TrajectoryProblem) -> Iterator[Cauti
     if problem.has_limits or not problem.about_robot:
         return
     limits = urdf_limits(problem.robot)
-    excess = excess_along(solution.trajectory, limits, refined=False)
-    most = np.maximum(excess.lower, excess.upper).max(axis=0)  # (kinds, nv)
+    most = -closeness(solution.trajectory, limits)
     found = []
     for kind, row in zip(KINDS, most, strict=False):
         joint, more = int(np.argmax(row)), int((row > limits.tolerance).sum()) - 1
         if more >= 0:
             others = f" and {more} more" if more else ""
             name = problem.coordinates.coordinate_names[joint]
-            found.append(f"the {KIND_NAMES[kind]} of joint {name!r}{others}")
+            found.append(f"the {QUANTITIES[kind]} of joint {name!r}{others}")
     if found:
         yield Caution(
             LIMITS,

@@ -13,10 +13,11 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.discrete.grid import Grid
+from hovi.planning.conditions.joint_quantity import DERIVATIVES
 from hovi.planning.problem.limits import Limits
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.problem.way_back.excused import Excused
-from hovi.planning.solver.limits.limited_coordinates import DERIVATIVES, LimitedCoordinates
+from hovi.planning.solver.limits.limited_coordinates import LimitedCoordinates
 from hovi.planning.solver.limits.limited_parts import LimitedParts
 from hovi.schemes.control_points import control_degree
 from hovi.system.dataclass import dataclass

@@ -23,10 +23,11 @@ from hovi.discrete.instants import Instants
 from hovi.discrete.interval_batch import Coordinates
 from hovi.discrete.interval_paths import scaled_data
 from hovi.optimize.bounded_objective import Refinement
+from hovi.planning.conditions.joint_quantity import DERIVATIVES
 from hovi.planning.problem.limits import Limits
 from hovi.planning.problem.way_back.excused import Excused
 from hovi.planning.solver.limits.graded_parts import GivenEnds, graded
-from hovi.planning.solver.limits.limited_coordinates import DERIVATIVES, LimitedCoordinates
+from hovi.planning.solver.limits.limited_coordinates import LimitedCoordinates
 from hovi.planning.solver.limits.limited_parts import LimitedParts
 from hovi.robot.space.configuration_space import ConfigurationSpace
 from hovi.schemes.control_points import control_degree, control_nodes, control_rows

@@ -25,7 +25,9 @@ from hovi.planning.clearance.clearance_violation import (
     approach_sentence,
     near_pairs,
 )
-from hovi.planning.problem.limit_violation import excess_along, excess_of, worst_sentence
+from hovi.planning.conditions.excess import excess_of, worst
+from hovi.planning.conditions.places import AtPoints
+from hovi.planning.problem.limit_conditions import LimitRange, closeness, limit_conditions
 from hovi.planning.problem.limits import Limits
 from hovi.planning.problem.presolve.end_torques import static_sentence
 from hovi.planning.problem.problem import TrajectoryProblem
@@ -375,8 +377,11 @@ class BoundedSearch:
         -inf for what rows bound, which holds by construction.
         """
         trajectory = self.problem.trajectory(path)
-        both = excess_of(trajectory, self.limits, self.rows.of.others(self.limits))
-        sides = np.stack(both).reshape(2, len(both[0]), -1)
+        sides = np.full((2, trajectory.grid.intervals, *self.limits.lower.shape), -np.inf)
+        for each in limit_conditions(self.limits, trajectory.grid.order, trajectory.space):
+            if isinstance(each.where, AtPoints) and isinstance(each.on, LimitRange):
+                sides[:, :, each.on.row, each.on.joints] = excess_of(trajectory, each)
+        sides = sides.reshape(2, len(sides[0]), -1)
         more = self.more
         if more is None:
             return sides
@@ -399,7 +404,9 @@ class BoundedSearch:
         trajectory, more = self.problem.trajectory(path), self.more
         if more is not None:
             excess, clause = more.worst(trajectory, self.limits.tolerance)
-            if excess >= excess_along(trajectory, self.limits, refined=False).worst:
+            if excess >= -closeness(trajectory, self.limits).min():
                 return clause
-        sentence = worst_sentence(trajectory, self.limits, self.problem.coordinates)
+        order, on = trajectory.grid.order, self.problem.coordinates
+        every = limit_conditions(self.limits, order, trajectory.space, on)
+        sentence = max(worst(trajectory, each) for each in every)[1]
         return sentence + static_sentence(self.problem, self.limits)

@@ -13,7 +13,7 @@ import numpy as np
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import DiscretePath
 from hovi.optimize.criteria import Criteria
-from hovi.planning.problem.limit_violation import closeness
+from hovi.planning.problem.limit_conditions import closeness
 from hovi.planning.problem.limits import KINDS, Limits
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.answer import Answer

@@ -11,15 +11,18 @@ from __future__ import annotations
 from collections.abc import Iterator
 from functools import cache
 from math import comb
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from hovi.discrete.interval_paths import scaled_data
 from hovi.discrete.trajectory import Trajectory
-from hovi.planning.problem.limits import Limits
+from hovi.planning.conditions.condition import Condition, scales
+from hovi.planning.conditions.joint_quantity import DERIVATIVES, JointQuantity
+from hovi.planning.conditions.places import ControlPoints
+from hovi.planning.problem.limit_conditions import LimitRange
 from hovi.planning.problem.way_back.excused import Excused
-from hovi.planning.solver.limits.limited_coordinates import DERIVATIVES, LimitedCoordinates
 from hovi.schemes.control_points import control_rows
 
 Array = npt.NDArray[np.float64]
@@ -29,30 +32,25 @@ MOST_HALVINGS = 40
 the control points are nearer to the curve than rounding errors."""
 
 
-def exceeds(motion: Trajectory, limits: Limits, limited: LimitedCoordinates, most: float) -> bool:
-    """Whether a limited coordinate is over a bound anywhere by more than a fraction of its range.
-
-    limited: the coordinates of the limits that are polynomials. most: the fraction.
-    """
-    orders = map(int, np.unique(limited.order))
-    found = (each for order in orders for each in _over_bounds(motion, limits, limited, order))
-    return any(_exceeds(each, most) for each in found)
+def exceeds(motion: Trajectory, given: Condition[Any, ControlPoints]) -> bool:
+    """Whether a limited coordinate is over a bound anywhere by more than the tolerance."""
+    return any(_exceeds(each, given.tolerance) for each in _over_bounds(motion, given))
 
 
-def _over_bounds(
-    motion: Trajectory, limits: Limits, limited: LimitedCoordinates, order: int
-) -> Iterator[Array]:
+def _over_bounds(motion: Trajectory, given: Condition[Any, ControlPoints]) -> Iterator[Array]:
     """Control points over the upper and below the lower bounds, as fractions, (M, d + 1) each."""
-    own = np.flatnonzero(limited.order == order)
-    whole = _control_points(motion, order, np.zeros(1), np.ones(1))[:, 0]
-    points = whole[:, :, limited.joint[own]].transpose(0, 2, 1)
-    for side, bounds in ((1, limited.upper), (-1, limited.lower)):
-        over = side * (points - bounds[:, own, None])
-        for each in limits.excused:
-            if each.side == side and DERIVATIVES.get(each.limit) == order:
-                column = int(np.flatnonzero(limited.joint[own] == each.coordinate)[0])
-                yield _led_back(motion, each, over[:, column]) / limited.ranges[own[column]]
-        yield (over / limited.ranges[own, None]).reshape(-1, points.shape[2])
+    y, on, scale = given.y, given.on, scales(given)
+    assert isinstance(y, JointQuantity)
+    assert isinstance(on, LimitRange)
+    whole = _control_points(motion, DERIVATIVES[y.quantity], np.zeros(1), np.ones(1))[:, 0]
+    points = whole[:, :, y.joints].transpose(0, 2, 1)
+    for side, bounds in zip((-1, 1), on.limits.on(motion.t), strict=True):
+        over = side * (points - bounds[:, on.row, on.joints, None])
+        for each in on.limits.excused:
+            if each.side == side and each.limit == y.quantity:
+                column = int(np.flatnonzero(y.joints == each.coordinate)[0])
+                yield _led_back(motion, each, over[:, column]) / scale[column]
+        yield (over / scale[:, None]).reshape(-1, points.shape[2])
 
 
 def _led_back(motion: Trajectory, excused: Excused, over: Array) -> Array:

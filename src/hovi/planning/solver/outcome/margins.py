@@ -8,9 +8,11 @@ from typing import Any
 
 from hovi.checks.arguments import check_arguments
 from hovi.discrete.trajectory import Trajectory
+from hovi.planning.clearance.clearance_violation import nearest_pair
+from hovi.planning.clearance.distances import distances_between
+from hovi.planning.conditions.excess import excess_along
 from hovi.planning.problem.problem import TrajectoryProblem
-from hovi.planning.solver.requirements.limit_margins import LimitMargins
-from hovi.planning.solver.requirements.requirements_of import requirements_between_ends
+from hovi.planning.solver.outcome.limit_margins import LimitMargins, limit_margins
 from hovi.system.dataclass import dataclass
 
 
@@ -48,7 +50,20 @@ def margins_of(problem: TrajectoryProblem, motion: Trajectory) -> Margins:
 
     Raises OutOfTimeError when the deadline in force passes before they are known.
     """
-    known: dict[str, Any] = {}
-    for each in requirements_between_ends(problem):
-        known |= each.margins(motion)
-    return Margins(**known)
+    return Margins(**margins_to_bounds(problem, motion), **margins_to_obstacles(problem, motion))
+
+
+def margins_to_bounds(problem: TrajectoryProblem, motion: Trajectory) -> dict[str, Any]:
+    """The fields of Margins but for distances."""
+    limits, segments = limit_margins(motion, problem.limits)
+    conditions = {each.name: -excess_along(motion, each).worst for each in problem.bounds}
+    return {"limits": limits, "segments": segments, "conditions": conditions}
+
+
+def margins_to_obstacles(problem: TrajectoryProblem, motion: Trajectory) -> dict[str, Any]:
+    """The least distance of all pairs, those out of reach included, and its pair."""
+    if problem.clearance is None or not problem.clearance.wanted:
+        return {}
+    every = distances_between(problem.robot, problem.clearance)
+    distance, pair = nearest_pair(motion, problem.clearance, every)
+    return {"distance": distance, "nearest_pair": pair}

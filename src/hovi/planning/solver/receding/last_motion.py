@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 from hovi.discrete.grid import DiscretePath
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.answer import Answer
-from hovi.planning.solver.requirements.ends import misses
-from hovi.planning.solver.requirements.requirements_of import requirements_between_ends
+from hovi.planning.solver.outcome.ends import misses
+from hovi.planning.solver.outcome.violation import violation_between_ends
 from hovi.planning.solver.status import Status
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ def satisfies(problem: TrajectoryProblem, path: DiscretePath) -> bool:
     Raises OutOfTimeError when the deadline in force passes before that is known.
     """
     motion = problem.trajectory(path)
-    return not any(each.violation(motion) for each in requirements_between_ends(problem))
+    return not violation_between_ends(problem, motion)
 
 
 def last_motion(

@@ -8,35 +8,29 @@ import numpy.typing as npt
 from hovi.discrete.grid import DiscretePath
 from hovi.discrete.state import Periodic, State
 from hovi.discrete.trajectory import Trajectory
+from hovi.planning.conditions.condition import TOLERANCE
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.notation.goal_turns import turns_missed
 from hovi.planning.problem.problem import TrajectoryProblem
-from hovi.planning.solver.requirements.requirement import SATISFIED, Requirement
-from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 
 _NAMES = "position", "velocity", "acceleration", "jerk"
 
 
-@dataclass(frozen=True, eq=False)
-class Ends(Requirement):
-    """A motion starts and ends as its problem says, and there is such a motion."""
+def ends_missed(problem: TrajectoryProblem, motion: Trajectory) -> str:
+    """How far a motion's ends are from the problem's, or why these cannot be reached, or ""."""
+    missed = misses(problem, motion.path) or _turns_missed(problem, motion)
+    return f"the motion {missed}" if missed else problem.unreachable
 
-    problem: TrajectoryProblem
 
-    def violation(self, motion: Trajectory) -> str:
-        """How far the ends are from the problem's, or why these cannot be reached."""
-        missed = misses(self.problem, motion.path) or self._turns_missed(motion)
-        return f"the motion {missed}" if missed else self.problem.unreachable
-
-    def _turns_missed(self, motion: Trajectory) -> str:
-        """By how many full turns the motion ends away from its goal, as a clause; "" if by none."""
-        goal, on = self.problem.goal, self.problem.coordinates
-        if not isinstance(goal, State) or not on.space.angles:
-            return ""
-        free = np.asarray(self.problem.free_ends[:, 0].any(axis=0))
-        return turns_missed(goal, on, motion.positions(motion.duration)[0], free)
+def _turns_missed(problem: TrajectoryProblem, motion: Trajectory) -> str:
+    """By how many full turns the motion ends away from its goal, as a clause; "" if by none."""
+    goal, on = problem.goal, problem.coordinates
+    if not isinstance(goal, State) or not on.space.angles:
+        return ""
+    free = np.asarray(problem.free_ends[:, 0].any(axis=0))
+    return turns_missed(goal, on, motion.positions(motion.duration)[0], free)
 
 
 def starts_there(problem: TrajectoryProblem, path: DiscretePath) -> bool:
@@ -49,7 +43,7 @@ def misses(problem: TrajectoryProblem, path: DiscretePath) -> str:
     parts = [_miss(problem, path, 0, "starts")]
     if isinstance(problem.goal, FrameGoal):
         distance, angle = problem.goal.miss(problem.robot, path.q[-1])
-        if max(distance, angle) > SATISFIED:
+        if max(distance, angle) > TOLERANCE:
             parts.append(f"ends {distance:.3g} m and {angle:.3g} rad from the goal of its frame")
     elif not isinstance(problem.goal, Periodic):
         parts.append(_miss(problem, path, 1, "ends"))
@@ -69,7 +63,7 @@ def _miss(problem: TrajectoryProblem, path: DiscretePath, end: int, verb: str) -
         change = on.difference(wanted[0], given[0]) if i == 0 else given[i] - wanted[i]
         change = np.where(problem.free_ends[end, i], 0.0, change)
         joint = int(np.argmax(np.abs(change)))
-        if abs(change[joint]) > SATISFIED:
+        if abs(change[joint]) > TOLERANCE:
             units = on.coordinate_units[joint]
             unit = units[i] if i < 3 else f"{units[0]}/s^{i}"
             name = on.coordinate_names[joint]

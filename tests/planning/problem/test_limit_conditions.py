@@ -13,13 +13,13 @@ from hovi.discrete.grid import Grid
 from hovi.discrete.path_on_grid import path_on_grid
 from hovi.discrete.state import State
 from hovi.discrete.trajectory import Trajectory
-from hovi.planning.problem.limit_violation import (
+from hovi.planning.conditions.excess import excess_along, excess_of, worst
+from hovi.planning.problem.limit_conditions import (
     closeness,
-    excess_along,
-    excess_of,
-    worst_sentence,
+    closeness_by_interval,
+    limit_conditions,
 )
-from hovi.planning.problem.limits import as_limits
+from hovi.planning.problem.limits import Limits, as_limits
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.robot.loading import load_robot
 from hovi.robot.robot import Robot
@@ -35,17 +35,21 @@ def motion(arm_scene: Scene) -> Trajectory:
     return plan(arm_scene, *ends, 1.0, intervals=5, limits="none").trajectory
 
 
+def worst_sentence(motion: Trajectory, limits: Limits, robot: Robot) -> str:
+    return max(worst(motion, each) for each in limit_conditions(limits, 2, None, robot))[1]
+
+
 LIMITS = {"base": "none", "q": 1.5, "v": [2.0, 4.0], "a": 20.0, "tau": [8.0, 3.0]}
 
 
 def test_extremes_are_those_of_dense_sampling(motion: Trajectory, two_link: Robot) -> None:
     limits = as_limits(two_link, LIMITS)
-    excess = excess_along(motion, limits)
+    excess = -closeness_by_interval(motion, limits)
     s = np.linspace(0.0, 1.0, 20_001)
     for k in range(motion.grid.intervals):
         outputs = np.stack(motion.sample_intervals(np.full(len(s), k), s), axis=1)
         dense = limits.excess(outputs).max(axis=0)
-        found = np.maximum(excess.lower[k], excess.upper[k])
+        found = excess[k]
         near = dense > -0.05
         assert near.any()
         np.testing.assert_allclose(found[near], dense[near], atol=1e-7)
@@ -56,11 +60,11 @@ def test_closeness_is_the_smallest_distance_from_the_bounds(
     motion: Trajectory, two_link: Robot
 ) -> None:
     limits = as_limits(two_link, LIMITS)
-    excess = excess_along(motion, limits)
     room = closeness(motion, limits)
     assert room.shape == (4, 2)
-    assert room.min() == pytest.approx(-excess.worst)
-    assert excess.by_interval.max() == pytest.approx(excess.worst)
+    every = [excess_along(motion, each).worst for each in limit_conditions(limits, 2, None)]
+    assert room.min() == -max(every)
+    assert np.isinf(closeness(motion, as_limits(two_link, {"base": "none", "q": 1.5}))[1:]).all()
 
 
 def test_the_worst_is_named_with_joint_time_and_numbers(
@@ -154,8 +158,9 @@ def _require_the_highest(
     s = np.linspace(0.0, 1.0, 100_001)
     np.testing.assert_allclose(motion.sample(s).v[:, 0], v(s), atol=1e-10)
     limits = as_limits(robot, {"base": "none", "v": [1.0, 1.0]})
-    excess = excess_along(motion, limits)
-    assert 2 * excess.upper[0, 1, 0] == pytest.approx(v(s).max() - 1.0, abs=1e-8)
+    (velocity,) = limit_conditions(limits, 2, None)
+    upper = excess_along(motion, velocity).sides[1]
+    assert 2 * upper[0, 0] == pytest.approx(v(s).max() - 1.0, abs=1e-8)
 
 
 def test_extremes_next_to_the_ends_of_a_polynomial_of_high_degree_are_found(
@@ -170,18 +175,15 @@ def test_extremes_next_to_the_ends_of_a_polynomial_of_high_degree_are_found(
 
 
 @pytest.mark.parametrize("tau", [0.6, 0.95, 0.999, 1.1])
-def test_excess_of_chosen_outputs_is_that_of_all_where_a_bound_may_be_exceeded(
+def test_a_first_look_finds_the_same_excess_where_a_bound_may_be_exceeded(
     motion: Trajectory, two_link: Robot, tau: float
 ) -> None:
     peak = np.abs(motion.sample(np.linspace(0.0, motion.duration, 5001)).tau).max(axis=0)
     limits = as_limits(two_link, LIMITS | {"tau": (tau * peak).tolist()})
-    chosen = np.zeros(limits.bounded.shape, dtype=bool)
-    chosen[3] = True
-    whole, (lower, upper) = excess_along(motion, limits), excess_of(motion, limits, chosen)
-    for some, every in ((lower, whole.lower), (upper, whole.upper)):
-        assert (some[:, :3] == -np.inf).all()
-        near = every[:, 3] > -0.02
-        np.testing.assert_array_equal(some[:, 3][near], every[:, 3][near])
-        assert (some[:, 3] <= every[:, 3]).all()
-        assert (some[:, 3][~near] <= -0.02).all()
-    assert (max(lower.max(), upper.max()) > 0.0) == (tau < 1.0)
+    torques = limit_conditions(limits, 2, None)[-1]
+    some, every = excess_of(motion, torques), excess_along(motion, torques).sides
+    near = every > -0.02
+    np.testing.assert_array_equal(some[near], every[near])
+    assert (some <= every).all()
+    assert (some[~near] <= -0.02).all()
+    assert (some.max() > 0.0) == (tau < 1.0)

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from hovi.checks.arguments import check_arguments
 from hovi.discrete.measures.motion_segments import motion_segments
 from hovi.discrete.trajectory import Trajectory
-from hovi.planning.problem.limit_violation import AT_LIMIT, excess_along
+from hovi.planning.problem.limit_conditions import AT_LIMIT, closeness_by_interval
 from hovi.planning.problem.limits import KINDS, Limits
 from hovi.system.dataclass import dataclass
 
@@ -85,8 +85,7 @@ def limit_margins(
     """The margins of a motion to limits, None without any, and those of each of its segments."""
     if limits is None or not limits.bounded.any():
         return None, {}
-    excess, names = excess_along(motion, limits), motion.coordinate_names
-    margin = -np.maximum(excess.lower, excess.upper)  # (N, kinds, nv)
+    margin, names = closeness_by_interval(motion, limits), motion.coordinate_names
     segments = motion_segments(motion)
     if not limits.parts or len(segments) != len(limits.parts):
         found = {

@@ -1,0 +1,221 @@
+"""By how much a motion exceeds the bounds of a condition, between the quadrature points, too."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi.discrete.trajectory import Trajectory
+from hovi.dynamics.torque_rate import TorqueRate
+from hovi.planning.conditions.condition import Condition, scales
+from hovi.planning.conditions.function import Points
+from hovi.planning.conditions.sets import Range
+from hovi.system.dataclass import dataclass
+from hovi.system.deadline import raise_if_late
+
+Array = npt.NDArray[np.float64]
+Index = npt.NDArray[np.intp]
+
+SAMPLES = 33
+"""Samples per interval in the first pass, both ends included."""
+POSITIONS = (1.0 - np.cos(np.pi * np.arange(SAMPLES) / (SAMPLES - 1))) / 2
+"""Their positions, closer at both ends, where polynomials of high degree oscillate faster."""
+REFINED_SAMPLES = 25
+"""Samples of each further pass, between the neighbours of an extreme sample."""
+BATCH = 128
+"""Extremes that are refined at once."""
+REFINEMENT_FRACTION = 0.05
+"""The largest extreme of an entry in an interval is refined if it is closer than this to a bound,
+as a fraction of its scale."""
+COARSE_MODES = 4
+COARSE = 4, 2
+"""Stride of the samples that `excess_of` looks at first: on grids of at most COARSE_MODES inner
+modes, and on others."""
+PEAK_FRACTION = 2e-3
+"""The same for every other local extreme; smaller, as a motion along a bound has many of them."""
+NO_BOUND = 1e3
+"""Distance from a bound, as a fraction of the scale, where it is infinite, or further away."""
+
+
+@dataclass(frozen=True, eq=False)
+class Excess:
+    """Largest excess over each bound in each interval, as a fraction of the scale; negative inside.
+
+    sides: over lower and upper bounds, shape (2, N, size). at: relative position in the interval of
+        that excess, in [0, 1], of the same shape.
+    """
+
+    sides: Array
+    at: Array
+
+    @property
+    def worst(self) -> float:
+        """The largest excess over any bound."""
+        return float(self.sides.max())
+
+
+def excess_along(motion: Trajectory, given: Condition[Range, Any]) -> Excess:
+    """The extremes of a function along the interpolant, compared with its bounds.
+
+    Every interval is sampled, and again more densely around all extremes that are near a bound, and
+    wherever the curvature of the samples allows an excess between them: a motion along a bound has
+    several extremes, and the largest one is not always next to the largest sample.
+    """
+    return _excess_in(np.arange(motion.grid.intervals), motion, given)
+
+
+def excess_of(motion: Trajectory, given: Condition[Range, Any]) -> Array:
+    """The excess over the lower and upper bounds in every interval, (2, N, size).
+
+    It is that of `excess_along` wherever that may be positive; elsewhere it is that of a few
+    samples, which are further from their bounds than neighboring ones differ.
+    """
+    raise_if_late()
+    N, grid = motion.grid.intervals, motion.grid
+    s = POSITIONS[:: COARSE[int(grid.inner_modes > COARSE_MODES)]]
+    over = _over(motion, given, np.repeat(np.arange(N), len(s)), np.tile(s, N))
+    over = over.reshape(2, N, len(s), -1)
+    sides = over.max(axis=2)
+    change = np.abs(np.diff(over, axis=2)).max(axis=2)
+    safe = sides + change <= -REFINEMENT_FRACTION  # false where it is no number
+    near = np.flatnonzero(~safe.all(axis=(0, 2)))
+    if len(near) > 0:
+        sides[:, near] = _excess_in(near, motion, given).sides
+    return np.asarray(sides)
+
+
+def worst(motion: Trajectory, given: Condition[Range, Any]) -> tuple[float, str]:
+    """The largest excess as a fraction of the scale, and the value, time and bound in words."""
+    found = excess_along(motion, given)
+    side, k, entry = np.unravel_index(int(np.argmax(found.sides)), found.sides.shape)
+    y, low, high, t = _values(motion, given, np.array([k]), found.at[side, [k], entry])
+    bound = (low, high)[side][0, entry]
+    named = given.y.named(int(entry))
+    subject, unit = named or (in_words(given, int(entry)), given.unit)
+    return float(found.sides[side, k, entry]), (
+        f"{subject} reaches {y[0, entry]:.4g}{unit and f' {unit}'} at t = {t[0]:.3g} s, its "
+        f"{'limit' if named else 'bound'} is {bound:.4g}"
+    )
+
+
+def in_words(given: Condition[Any, Any], entry: int) -> str:
+    """A condition and the entry of its function, in a sentence."""
+    if given.of:
+        return f"condition {given.name!r} of {given.of[entry]!r}"
+    return f"condition {given.name!r}" + (f" of entry {entry}" if given.y.size > 1 else "")
+
+
+def _values(
+    motion: Trajectory, given: Condition[Range, Any], k: Index, s: Array
+) -> tuple[Array, Array, Array, Array]:
+    """y and its bounds at relative positions s in intervals k, (M, size) each, and the times."""
+    at, t = _points(motion, k, s, given.y.needs), motion.t
+    return given.y.values(at), *given.on.at(at.t, given.y.size, t[k + 1] / 2 + t[k] / 2), at.t
+
+
+def _over(motion: Trajectory, given: Condition[Range, Any], k: Index, s: Array) -> Array:
+    """low - y and y - high over the scale at relative positions s in intervals k, (2, M, size)."""
+    y, low, high, _ = _values(motion, given, k, s)
+    return np.maximum(np.stack([low - y, y - high]) / scales(given), -NO_BOUND)
+
+
+def _points(motion: Trajectory, k: Index, s: Array, needs: frozenset[str]) -> Points:
+    """What is needed of a motion at relative positions s in intervals k."""
+    tau = jerk = rate = None
+    if "jerk" in needs or "torque_rate" in needs:
+        q, v, a, jerk = motion.jet_intervals(k, s, 3)
+    elif "tau" in needs:
+        q, v, a, tau = motion.sample_intervals(k, s)
+    else:
+        q, v, a = motion.jet_intervals(k, s)
+    if "torque_rate" in needs:
+        rate = np.zeros_like(v)  # as it is not known without a scene
+    if "torque_rate" in needs and jerk is not None and motion.scene is not None:
+        rate = TorqueRate(motion.scene.torques, q, v, a, jerk, motion.space).value()
+    return Points(q, v, motion.t[k] + s * motion.grid.steps[k], a, tau, jerk, rate)
+
+
+def _excess_in(intervals: Index, motion: Trajectory, given: Condition[Range, Any]) -> Excess:
+    """As `excess_along`, in some intervals."""
+    raise_if_late()
+    N = len(intervals)
+    over = _over(motion, given, np.repeat(intervals, SAMPLES), np.tile(POSITIONS, N))
+    sides = enumerate(over.reshape(2, N, SAMPLES, -1))
+    found = [_Side(motion, given, i).extremes(each, intervals) for i, each in sides]
+    largest, at = (np.stack(each) for each in zip(*found, strict=True))
+    return Excess(largest, at)
+
+
+@dataclass(frozen=True, eq=False)
+class _Side:
+    """The lower bounds of a condition, 0, or its upper ones, 1."""
+
+    motion: Trajectory
+    given: Condition[Range, Any]
+    side: int
+
+    def extremes(self, excess: Array, intervals: Index) -> tuple[Array, Array]:
+        """The largest excess in each interval, and its relative position, (N, size) each.
+
+        excess: of all samples, shape (N, SAMPLES, size). intervals: their numbers, (N,).
+        """
+        raise_if_late()
+        index = np.argmax(excess, axis=1)
+        largest = np.take_along_axis(excess, index[:, None], axis=1)[:, 0]
+        at = POSITIONS[index]
+        k, sample, entry = np.nonzero(
+            _near_extremes(excess, largest) | _may_exceed(excess, self.given.tolerance)
+        )
+        for first in range(0, len(k), BATCH):  # in batches, since a deadline may be in force
+            raise_if_late()
+            one = slice(first, first + BATCH)
+            rows, entries = k[one], entry[one]
+            found, s = self._refined(intervals[rows], sample[one], entries)
+            for i in np.argsort(found):  # the largest of each interval and entry comes last
+                place = rows[i], entries[i]
+                if found[i] >= largest[place]:
+                    largest[place], at[place] = found[i], s[i]
+        return largest, at
+
+    def _refined(self, k: Index, sample: Index, entry: Index) -> tuple[Array, Array]:
+        """The excess at M extremes and their positions, from three denser samplings around them.
+
+        k: intervals. sample: the extreme samples. entry: of the function. All (M,).
+        """
+        rows, every = np.arange(len(k)), np.repeat(k, REFINED_SAMPLES)
+        begin = POSITIONS[np.maximum(sample - 1, 0)]
+        end = POSITIONS[np.minimum(sample + 1, SAMPLES - 1)]
+        for _ in range(3):
+            step = (end - begin) / (REFINED_SAMPLES - 1)
+            around = np.minimum(begin[:, None] + step[:, None] * np.arange(REFINED_SAMPLES), 1.0)
+            over = _over(self.motion, self.given, every, around.ravel())[self.side]
+            excess = over.reshape(len(k), REFINED_SAMPLES, -1)[rows, :, entry]
+            best = np.argmax(excess, axis=1)
+            at = around[rows, best]
+            begin, end = np.maximum(at - step, 0.0), np.minimum(at + step, 1.0)
+        return excess[rows, best], at
+
+
+def _near_extremes(excess: Array, largest: Array) -> npt.NDArray[np.bool_]:
+    """Samples that are local extremes, and are the largest of their entry or next to its bound.
+
+    excess: of the samples, shape (N, SAMPLES, K). largest: of each interval, shape (N, K).
+    """
+    padded = np.pad(excess, ((0, 0), (1, 1), (0, 0)), constant_values=-np.inf)
+    with np.errstate(invalid="ignore"):
+        peak = (excess >= padded[:, :-2]) & (excess >= padded[:, 2:])
+    highest = (excess == largest[:, None]) & (excess > -REFINEMENT_FRACTION)
+    return np.asarray(peak & np.isfinite(excess) & (highest | (excess > -PEAK_FRACTION)))
+
+
+def _may_exceed(excess: Array, tolerance: float) -> npt.NDArray[np.bool_]:
+    """Samples next to which a parabola through three of them may exceed a bound.
+
+    excess: of the samples, shape (N, SAMPLES, K). tolerance: of an excess.
+    """
+    with np.errstate(invalid="ignore"):
+        bend = np.abs(np.diff(excess, 2, axis=1))
+        bend = np.concatenate([bend[:, :1], bend, bend[:, -1:]], axis=1)
+        return np.asarray(excess + 0.5 * bend > tolerance) & np.isfinite(excess)

@@ -1,1 +1,0 @@
-"""What a problem requires of its motions, one kind a file, and what a motion violates of it."""
