@@ -226,7 +226,6 @@ def test_bounds_may_change_with_time(scene: hovi.Scene) -> None:
         found.advance(0.3)
 
 
-@pytest.mark.xfail(strict=True, reason="a dip of 2 ms in 1 s is narrower than the samples")
 def test_a_bound_that_dips_between_the_samples_is_kept(two_link: hovi.Robot) -> None:
     def most(t: float) -> float:
         return 20.0 - 19.5 * float(np.exp(-(((t - 0.61) / 0.001) ** 2)))

@@ -17,9 +17,10 @@ CAUTIONS = "cautions"
 _EARLIER = "caution"
 """That of earlier versions of hovi: the sentences against executing the motion, as one text."""
 STATUS, COLLISION, COARSE, SPINS = "status", "collision", "coarse", "spins"
-LIMITS, LEFT_OUT, WARNED = "limits", "left out", "warned"
+LIMITS, SAMPLED, LEFT_OUT, WARNED = "limits", "sampled", "left out", "warned"
 """Words: the motion is no minimum; its links enter each other; its grid is coarse; a light joint
-spins; it is beyond limits that it was planned without; what its scene leaves unsaid; warnings."""
+spins; it is beyond limits that it was planned without; a condition was looked at by samples alone;
+what its scene leaves unsaid; warnings."""
 _AGAINST = STATUS, COLLISION
 _VIOLATED = "infeasible", "diverged"
 _UNFINISHED = "saddle", "unresolved", "iteration_limit", "time_limit", "interrupted"

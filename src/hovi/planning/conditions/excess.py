@@ -7,11 +7,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from hovi.discrete.cells import INSTANTS, Cells
 from hovi.discrete.trajectory import Trajectory
 from hovi.dynamics.torque_rate import TorqueRate
 from hovi.planning.conditions.condition import Condition, scales
 from hovi.planning.conditions.function import Points
-from hovi.planning.conditions.sets import Range
+from hovi.planning.conditions.narrow import NO_BOUND, PEAK_FRACTION, NarrowCells, features_of
+from hovi.planning.conditions.sets import Between, Range
 from hovi.system.dataclass import dataclass
 from hovi.system.deadline import raise_if_late
 
@@ -33,10 +35,6 @@ COARSE_MODES = 4
 COARSE = 4, 2
 """Stride of the samples that `excess_of` looks at first: on grids of at most COARSE_MODES inner
 modes, and on others."""
-PEAK_FRACTION = 2e-3
-"""The same for every other local extreme; smaller, as a motion along a bound has many of them."""
-NO_BOUND = 1e3
-"""Distance from a bound, as a fraction of the scale, where it is infinite, or further away."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +61,8 @@ def excess_along(motion: Trajectory, given: Condition[Range, Any]) -> Excess:
     wherever the curvature of the samples allows an excess between them: a motion along a bound has
     several extremes, and the largest one is not always next to the largest sample.
     """
-    return _excess_in(np.arange(motion.grid.intervals), motion, given)
+    every = Cells.of(motion.grid.intervals, 1)
+    return _with_narrow(_excess_in(every, motion, given), motion, given)
 
 
 def excess_of(motion: Trajectory, given: Condition[Range, Any]) -> Array:
@@ -82,8 +81,8 @@ def excess_of(motion: Trajectory, given: Condition[Range, Any]) -> Array:
     safe = sides + change <= -REFINEMENT_FRACTION  # false where it is no number
     near = np.flatnonzero(~safe.all(axis=(0, 2)))
     if len(near) > 0:
-        sides[:, near] = _excess_in(near, motion, given).sides
-    return np.asarray(sides)
+        sides[:, near] = _excess_in(Cells.of(N, 1).chosen(near), motion, given).sides
+    return _with_narrow(Excess(sides, np.zeros_like(sides)), motion, given).sides
 
 
 def worst(motion: Trajectory, given: Condition[Range, Any]) -> tuple[float, str]:
@@ -97,6 +96,22 @@ def worst(motion: Trajectory, given: Condition[Range, Any]) -> tuple[float, str]
     return float(found.sides[side, k, entry]), (
         f"{subject} reaches {y[0, entry]:.4g}{unit and f' {unit}'} at t = {t[0]:.3g} s, its "
         f"{'limit' if named else 'bound'} is {bound:.4g}"
+    )
+
+
+def undecided(motion: Trajectory, given: Condition[Between, Any]) -> str:
+    """What of a condition was looked at by samples alone, a sentence; "" if nothing."""
+    name, sampled = f"Condition {given.name!r}", features_of(given).sampled
+    if _narrow(motion, given).unresolved:
+        return (
+            f"{name} changes in too many places to look at all: between them its bounds may be "
+            "exceeded."
+        )
+    if not sampled:
+        return ""
+    return (
+        f"{name} was looked at at {INSTANTS:,} instants, as {sampled} cannot be bounded between "
+        "them: narrower features may be missed."
     )
 
 
@@ -137,29 +152,56 @@ def _points(motion: Trajectory, k: Index, s: Array, needs: frozenset[str]) -> Po
     return Points(q, v, motion.t[k] + s * motion.grid.steps[k], a, tau, jerk, rate)
 
 
-def _excess_in(intervals: Index, motion: Trajectory, given: Condition[Range, Any]) -> Excess:
-    """As `excess_along`, in some intervals."""
+def _narrow(motion: Trajectory, given: Condition[Between, Any]) -> NarrowCells:
+    def over(k: Index, s: Array) -> Array:
+        return np.concatenate(_over(motion, given, k, s), axis=1)
+
+    def points(k: Index, s: Array) -> Points:
+        return _points(motion, k, s, given.y.needs)
+
+    return NarrowCells(given, motion.grid, over, points)
+
+
+def _with_narrow(found: Excess, motion: Trajectory, given: Condition[Range, Any]) -> Excess:
+    """The same, and what is exceeded in narrow cells; limits need none."""
+    if not isinstance(given.on, Between):
+        return found
+    cells = _narrow(motion, given).cells
+    if len(cells) == 0:
+        return found
+    inside, sides, at = _excess_in(cells, motion, given), found.sides.copy(), found.at.copy()
+    for side, cell, entry in np.argwhere(inside.sides > sides[:, cells.interval]):
+        place, over = (side, cells.interval[cell], entry), inside.sides[side, cell, entry]
+        if over > sides[place]:
+            sides[place], at[place] = over, cells.position(cell, inside.at[side, cell, entry])
+    return Excess(sides, at)
+
+
+def _excess_in(cells: Cells, motion: Trajectory, given: Condition[Range, Any]) -> Excess:
+    """As `excess_along`, in cells, with positions in these."""
     raise_if_late()
-    N = len(intervals)
-    over = _over(motion, given, np.repeat(intervals, SAMPLES), np.tile(POSITIONS, N))
-    sides = enumerate(over.reshape(2, N, SAMPLES, -1))
-    found = [_Side(motion, given, i).extremes(each, intervals) for i, each in sides]
+    P = len(cells)
+    k, s = np.repeat(np.arange(P), SAMPLES), np.tile(POSITIONS, P)
+    over = _over(motion, given, cells.interval[k], cells.position(k, s))
+    sides = enumerate(over.reshape(2, P, SAMPLES, -1))
+    found = [_Side(motion, given, cells, i).extremes(each) for i, each in sides]
     largest, at = (np.stack(each) for each in zip(*found, strict=True))
     return Excess(largest, at)
 
 
 @dataclass(frozen=True, eq=False)
 class _Side:
-    """The lower bounds of a condition, 0, or its upper ones, 1."""
+    """The lower bounds of a condition, 0, or its upper ones, 1, in cells."""
 
     motion: Trajectory
     given: Condition[Range, Any]
+    cells: Cells
     side: int
 
-    def extremes(self, excess: Array, intervals: Index) -> tuple[Array, Array]:
-        """The largest excess in each interval, and its relative position, (N, size) each.
+    def extremes(self, excess: Array) -> tuple[Array, Array]:
+        """The largest excess in each cell, and its relative position, (P, size) each.
 
-        excess: of all samples, shape (N, SAMPLES, size). intervals: their numbers, (N,).
+        excess: of all samples, shape (P, SAMPLES, size).
         """
         raise_if_late()
         index = np.argmax(excess, axis=1)
@@ -172,8 +214,8 @@ class _Side:
             raise_if_late()
             one = slice(first, first + BATCH)
             rows, entries = k[one], entry[one]
-            found, s = self._refined(intervals[rows], sample[one], entries)
-            for i in np.argsort(found):  # the largest of each interval and entry comes last
+            found, s = self._refined(rows, sample[one], entries)
+            for i in np.argsort(found):  # the largest of each cell and entry comes last
                 place = rows[i], entries[i]
                 if found[i] >= largest[place]:
                     largest[place], at[place] = found[i], s[i]
@@ -182,15 +224,17 @@ class _Side:
     def _refined(self, k: Index, sample: Index, entry: Index) -> tuple[Array, Array]:
         """The excess at M extremes and their positions, from three denser samplings around them.
 
-        k: intervals. sample: the extreme samples. entry: of the function. All (M,).
+        k: cells. sample: the extreme samples. entry: of the function. All (M,).
         """
         rows, every = np.arange(len(k)), np.repeat(k, REFINED_SAMPLES)
         begin = POSITIONS[np.maximum(sample - 1, 0)]
         end = POSITIONS[np.minimum(sample + 1, SAMPLES - 1)]
+        intervals = self.cells.interval[every]
         for _ in range(3):
             step = (end - begin) / (REFINED_SAMPLES - 1)
             around = np.minimum(begin[:, None] + step[:, None] * np.arange(REFINED_SAMPLES), 1.0)
-            over = _over(self.motion, self.given, every, around.ravel())[self.side]
+            s = self.cells.position(every, around.ravel())
+            over = _over(self.motion, self.given, intervals, s)[self.side]
             excess = over.reshape(len(k), REFINED_SAMPLES, -1)[rows, :, entry]
             best = np.argmax(excess, axis=1)
             at = around[rows, best]

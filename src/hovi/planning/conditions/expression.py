@@ -42,6 +42,11 @@ class Expression(Function):
         self._names = [x for x in self._named if x != "t"]
 
     @property
+    def function(self) -> ca.Function:
+        """y of the arguments that it names, in the order of ARGUMENTS."""
+        return self._values.function
+
+    @property
     def needs(self) -> frozenset[str]:
         """What the expression names."""
         return frozenset(self._named)

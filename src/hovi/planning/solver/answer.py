@@ -10,9 +10,11 @@ from typing import TYPE_CHECKING, Any
 from hovi.discrete.grid import DiscretePath
 from hovi.discrete.instants import Instants
 from hovi.discrete.interval_batch import Jet
+from hovi.discrete.output.caution import SAMPLED, Caution, with_cautions
 from hovi.discrete.trajectory import Trajectory
 from hovi.optimize.ended import Iteration, Reason
 from hovi.optimize.quadratic_model import QuadraticModel
+from hovi.planning.conditions.excess import undecided
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.limits.row_forces import at_instants
 from hovi.planning.solver.nodal_momenta import accumulated_momenta
@@ -98,7 +100,18 @@ class Answer:
             metadata["clearance"] = problem.clearance.to_dict()
         ld = at_instants(problem, self.instants).ld
         momenta = accumulated_momenta(ld.derivatives(self.path, self.forces, self.jets))
-        return problem.motion(self.path, momenta, metadata)
+        motion = problem.motion(self.path, momenta, metadata)
+        metadata = with_cautions(metadata, _undecided(problem, motion))
+        return dataclasses.replace(motion, metadata=metadata) if problem.bounds else motion
+
+
+def _undecided(problem: TrajectoryProblem, motion: Trajectory) -> list[Caution]:
+    """The conditions of which features may be missed along a motion."""
+    try:
+        sentences = [undecided(motion, each) for each in problem.bounds]
+    except OutOfTimeError:  # of a motion that is no success
+        return []
+    return [Caution(SAMPLED, each) for each in sentences if each]
 
 
 def answered(solve: Callable[[], Answer], stopped: Callable[[Reason], Answer]) -> Answer:

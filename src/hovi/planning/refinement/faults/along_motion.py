@@ -13,6 +13,15 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
+from hovi.discrete.cells import (
+    CHANGE,
+    FIRST_CELLS,
+    INSTANTS,
+    LEAST_FRACTION,
+    SPLIT,
+    Cells,
+    between,
+)
 from hovi.discrete.trajectory import Trajectory
 from hovi.effects.expressions.interval_rules import Array, Bound
 from hovi.effects.expressions.time_parts import TimePart, from_line
@@ -25,56 +34,11 @@ from hovi.system.dataclass import dataclass
 
 Index = npt.NDArray[np.intp]
 
-CHANGE = 1.0
-"""Largest change of the argument of a function in a cell of time, as in exp(x) or sin(x)."""
-FIRST_CELLS = 4
-"""Least number of cells of an interval."""
-SPLIT = 4
-"""Pieces into which a cell is split. Most of the time is spent per instruction, not per cell."""
-INSTANTS = 2000
-"""Least number of instants at which a Lagrangian without bounds is looked at."""
 MAX_CELLS = 20_000
 """Maximum number of cells of a motion."""
-LEAST_FRACTION = 2.0**-34
-"""Shortest cell, relative to the duration."""
 _RULES = [np.polynomial.legendre.leggauss(points) for points in (4, 6)]
 _S = np.concatenate([(x + 1) / 2 for x, _ in _RULES])
 """The points of both rules in [0, 1]."""
-
-
-@dataclass(frozen=True, eq=False)
-class Cells:
-    """Cells of intervals. interval: their numbers. begin, end: in [0, 1], all of shape (P,)."""
-
-    interval: Index
-    begin: Array
-    end: Array
-
-    @classmethod
-    def of(cls, intervals: int, number: int) -> Cells:
-        """Equal cells of every interval."""
-        k, s = np.repeat(np.arange(intervals), number), np.arange(number) / number
-        return cls(k, np.tile(s, intervals), np.tile(s + 1 / number, intervals))
-
-    def __len__(self) -> int:
-        return len(self.begin)
-
-    def chosen(self, which: npt.NDArray[np.bool_] | Index) -> Cells:
-        """Some of them."""
-        return Cells(self.interval[which], self.begin[which], self.end[which])
-
-    def split(self) -> Cells:
-        """SPLIT equal pieces of each."""
-        s = np.arange(SPLIT + 1) / SPLIT
-        ends = self.begin[:, None] + (self.end - self.begin)[:, None] * s
-        k = np.repeat(self.interval, SPLIT)
-        return Cells(k, ends[:, :-1].ravel(), ends[:, 1:].ravel())
-
-    def joined(self, others: Cells) -> Cells:
-        """These and others."""
-        pairs = zip(*((x.interval, x.begin, x.end) for x in (self, others)), strict=True)
-        k, begin, end = (np.concatenate(pair) for pair in pairs)
-        return Cells(k, begin, end)
 
 
 @dataclass(frozen=True, eq=False)
@@ -192,7 +156,7 @@ class _Look:
 
     def _integrals(self, cells: Cells) -> Array:
         """The integral of L over each cell by two rules, shape (2, P)."""
-        k, s = np.repeat(cells.interval, len(_S)), _inside(cells, _S)
+        k, s = np.repeat(cells.interval, len(_S)), cells.inside(_S)
         jet = self.motion.jet_intervals(k, s, self.lagrangian.order)
         t = self.motion.t[k] + s * self.motion.grid.steps[k]
         values = self.lagrangian.value(*jet, t=t).reshape(len(cells), -1)
@@ -251,13 +215,13 @@ class _Look:
 
     def _boxes(self, cells: Cells, steps: Array) -> tuple[list[Bound], list[Bound], Array]:
         """Bounds of (q, v, a, tau, t) in each cell, of (da/dt, dtau/dt), and the largest |tau|."""
-        k, s = np.repeat(cells.interval, 3), _inside(cells, np.array([0.0, 0.5, 1.0]))
+        k, s = np.repeat(cells.interval, 3), cells.inside(np.array([0.0, 0.5, 1.0]))
         sample = self.motion.sample_intervals(k, s)
         t = self.motion.t[k] + s * self.motion.grid.steps[k]
         triples = [x.reshape(len(cells), 3, -1) for x in (*sample, t)]
         changes = [2.0 * np.diff(triples[i], axis=1) / steps[:, None, None] for i in (2, 3)]
         tau = np.abs(triples[3]).max(axis=1)
-        return [_between(x) for x in triples], [_slopes(x) for x in changes], tau
+        return [between(x) for x in triples], [_slopes(x) for x in changes], tau
 
 
 def _deviations(
@@ -271,21 +235,6 @@ def _deviations(
         slopes = effect.rate(some, CHANGE)
         away[wild] = from_line(bounds.chosen(wild), slopes, steps[wild][:, None])
     return away
-
-
-def _inside(cells: Cells, s: Array) -> Array:
-    """Positions s in [0, 1] of each cell, as those of its interval, one cell after the other."""
-    positions = cells.begin[:, None] + (cells.end - cells.begin)[:, None] * s
-    return np.clip(positions, 0.0, 1.0).ravel()
-
-
-def _between(x: Array) -> Bound:
-    """Bounds of a smooth curve from its ends and its middle, (P, 3, n), with a margin.
-
-    A parabola leaves them by at most a quarter of the middle's distance from the line.
-    """
-    bend = np.abs(x[:, 1] - 0.5 * (x[:, 0] + x[:, 2]))
-    return x.min(axis=1) - bend, x.max(axis=1) + bend
 
 
 def _slopes(x: Array) -> Bound:

@@ -7,12 +7,12 @@ import dataclasses
 import numpy as np
 import numpy.typing as npt
 
+from hovi.discrete.cells import INSTANTS
 from hovi.discrete.curve_integral import integral_along
 from hovi.discrete.grid import Grid
 from hovi.planning.problem.tolerance import CURVE_TOLERANCE
 from hovi.planning.refinement.error_estimate import with_estimate
 from hovi.planning.refinement.faults.along_motion import (
-    INSTANTS,
     AlongMotion,
     along_motion,
     may_be_narrow,
