@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -166,7 +166,7 @@ def _with_narrow(found: Excess, motion: Trajectory, given: Condition[Range, Any]
     """The same, and what is exceeded in narrow cells; limits need none."""
     if not isinstance(given.on, Between):
         return found
-    cells = _narrow(motion, given).cells
+    cells = _narrow(motion, cast(Condition[Between, Any], given)).cells
     if len(cells) == 0:
         return found
     inside, sides, at = _excess_in(cells, motion, given), found.sides.copy(), found.at.copy()

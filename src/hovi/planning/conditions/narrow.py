@@ -135,7 +135,9 @@ class NarrowCells:
     would be needed than are looked at.
     """
 
-    def __init__(self, given: Condition[Between, Any], grid: Grid, sampled: Sampled, at: At) -> None:
+    def __init__(
+        self, given: Condition[Between, Any], grid: Grid, sampled: Sampled, at: At
+    ) -> None:
         self._given, self._of = given, features_of(given)
         self._grid, self._at = grid, at
         self.unresolved, N = False, grid.intervals

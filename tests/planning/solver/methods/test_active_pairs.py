@@ -18,7 +18,6 @@ from hovi.planning.clearance.convex_shapes import convex_geometry
 from hovi.planning.clearance.obstacles import Obstacle
 from hovi.planning.problem.limits import as_limits
 from hovi.planning.problem.problem import TrajectoryProblem
-from hovi.planning.solver.methods import active_pairs
 from hovi.robot.robot import Robot
 from hovi.schemes import galerkin
 from hovi.system.deadline import OutOfTimeError
@@ -94,7 +93,7 @@ def test_what_stops_the_last_check_of_distances_leaves_the_motion_found(
             raise raised
         return near_pairs(*args)
 
-    monkeypatch.setattr(active_pairs, "near_pairs", stopped)
+    monkeypatch.setattr("hovi.planning.solver.methods.active_pairs.near_pairs", stopped)
     found = planned(kept=True)
     assert found.status.value == status
     assert len(calls) == 2
