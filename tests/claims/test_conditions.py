@@ -307,6 +307,85 @@ def test_a_scene_file_limits_the_power(models: Path, tmp_path: Path) -> None:
             limited_to(bound)
 
 
+AT_ENDS: dict[str, tuple[hovi.Condition, dict[str, Any], str]] = {
+    "a start": (
+        hovi.Condition("q", hovi.Between(0.1, 2.0), name="c"),
+        {},
+        "condition 'c' of entry 0 is 0 at the start, outside its bounds [0.1, 2]",
+    ),
+    "a goal": (
+        hovi.Condition("q", hovi.Between(-1.0, 0.9), name="c", unit="rad"),
+        {},
+        "condition 'c' of entry 0 is 1 rad at the goal, outside its bounds [-1, 0.9]",
+    ),
+    "a velocity": (
+        hovi.Condition("v", hovi.Between(-3.0, 3.0), name="c"),
+        {"start": hovi.State([0.0, 0.0], [0.0, 4.0])},
+        "condition 'c' of entry 1 is 4 at the start",
+    ),
+    "the power at rest": (
+        hovi.Condition("tau * v", hovi.Between(1.0, 30.0), name="c"),
+        {},
+        "condition 'c' of entry 0 is 0 at the start",
+    ),
+    "a smooth motion's torque": (
+        hovi.Condition("tau", hovi.Between(-1.0, 1.0), name="c"),
+        {"smooth": True},
+        "condition 'c' of entry 0 is 7.66406 at the start",
+    ),
+    "a smooth motion's acceleration": (
+        hovi.Condition("a", hovi.Between(1.0, 3e3), name="c"),
+        {"smooth": True},
+        "condition 'c' of entry 0 is 0 at the start",
+    ),
+    "a bound of the time": (
+        hovi.Condition("q", hovi.Between(-9.0, lambda t: 1.2 - 0.3 * t), name="c", scale=1.0),
+        {},
+        "condition 'c' of entry 0 is 1 at the goal, outside its bounds [-9, 0.9]",
+    ),
+    "what a free joint cannot change": (
+        hovi.Condition("v", hovi.Between(1.0, 3.0), name="c", of=["shoulder", "elbow"]),
+        {"goal": hovi.State([1.0, 0.5], free=["shoulder"])},
+        "condition 'c' of 'shoulder' is 0 at the start",
+    ),
+}
+
+
+@pytest.mark.parametrize("what", AT_ENDS)
+def test_an_end_that_violates_a_condition_is_refused_at_once(
+    two_link: hovi.Robot, what: str
+) -> None:
+    asked, given, sentence = AT_ENDS[what]
+    scene = hovi.Scene(two_link, [hovi.effects.Gravity()])
+    ends = {"start": [0.0, 0.0], "goal": [1.0, 0.5], "duration": 1.0, "limits": "none", **given}
+    for more in ({}, {"duration": (0.5, 2.0), "time_weight": 1.0}):
+        if more and what == "a bound of the time":
+            continue
+        found = hovi.plan(scene, **{**ends, **more}, conditions=[asked], **OPTIONS)
+        assert (found.status, found.nit) == (hovi.Status.INFEASIBLE, 0)
+        assert sentence in found.message
+
+
+@pytest.mark.parametrize(
+    ("function", "given"),
+    [
+        ("q", {"goal": hovi.State([1.0, 0.5], free=["shoulder"])}),
+        ("tau", {}),
+        ("tau * v", {"start": hovi.State([0.0, 0.0], [1.0, 0.0])}),
+    ],
+)
+def test_an_end_that_may_satisfy_a_condition_is_not_refused(
+    two_link: hovi.Robot, function: str, given: dict[str, Any]
+) -> None:
+    """What is free there does: a position, or an acceleration and with it the torque."""
+    scene = hovi.Scene(two_link, [hovi.effects.Gravity()])
+    bounds = {"q": (-1.0, 0.9), "tau": (-9.0, 9.0), "tau * v": (-2.0, 3.0)}[function]
+    asked = hovi.Condition(function, hovi.Between(*bounds), name="c")
+    ends = {"start": [0.0, 0.0], "goal": [1.0, 0.5], "duration": 1.0, "limits": "none", **given}
+    found = hovi.plan(scene, **ends, conditions=[asked], continuation=False, **OPTIONS)
+    assert found.nit > 0
+
+
 def broken(function: Any, on: Any = None, **more: Any) -> Callable[[], hovi.Condition]:
     return lambda: hovi.Condition(function, on or hovi.Between(-1, 1), name="odd", **more)
 
@@ -352,6 +431,18 @@ REFUSED: dict[str, tuple[Callable[[], Any], str]] = {
     "no value": (lambda: hovi.Equal(np.nan), "finite numbers"),
     "no time": (lambda: hovi.AtTimes([]), "positive times"),
     "varying": (broken("q", hovi.Between(lambda t: -t - 1.0, 1.0)), "needs a `scale`"),
+    "crossing": (
+        broken("q", hovi.Between(lambda t: 2 * t - 3, lambda t: 2 - 2 * t), scale=1.0),
+        "condition 'odd' has an empty range at t = 1.25 s: [-0.4995, -0.5005]",
+    ),
+    "crossing for a while": (
+        broken("q", hovi.Between(-3.0, lambda t: 2.0 if abs(t - 0.5) > 1e-3 else -3.0), scale=1.0),
+        "condition 'odd' has an empty range at t = 0.4995 s: [-3, -3]",
+    ),
+    "failing later": (
+        broken("q", hovi.Between(-9, lambda t: 1.0 if t < 1 else 1 / 0), scale=1.0),
+        "the upper bound at t = 1 s of a Between failed: division by zero",
+    ),
     "failing bound": (
         broken("q", hovi.Between(-9, lambda t: 1 / (t - t)), scale=1.0),
         "the upper bound at t = 0 s of a Between failed: float division by zero",

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
+from hovi.discrete.cells import INSTANTS
 from hovi.discrete.grid import Grid
 from hovi.errors import InputError
 from hovi.planning.conditions.condition import Condition, Equation, Inequality, with_function
@@ -34,6 +36,31 @@ def as_conditions(given: Any) -> tuple[Condition[Any, Any], ...]:
 def checked(given: Any, coordinates: Coordinates) -> tuple[Condition[Any, Any], ...]:
     """The conditions, each `with_function` of a robot's coordinates, whose errors it raises."""
     return tuple(with_function(each, coordinates) for each in as_conditions(given))
+
+
+def require_ranges(given: Given, duration: float) -> None:
+    """Raise InputError for bounds that leave no value at a time of a motion, or fail there."""
+    for each in given:
+        if isinstance(each.on, Between) and each.on.varies:
+            empty = empty_range(each.on, duration)
+            if empty is not None:
+                t, low, high = empty
+                raise InputError(
+                    f"condition {each.name!r} has an empty range at t = {t:.4g} s: [{low:.6g}, "
+                    f"{high:.6g}]; lower must be less than upper all along the motion."
+                )
+
+
+@lru_cache(maxsize=64)
+def empty_range(on: Between, duration: float) -> tuple[float, float, float] | None:
+    """The first time at which a range is empty, and its bounds, of INSTANTS; None if none is."""
+    t = np.linspace(0.0, duration, INSTANTS + 1)
+    low, high = np.broadcast_arrays(*on.at(t, None))
+    found = np.argwhere(low >= high)
+    if len(found) == 0:
+        return None
+    i, entry = found[0]
+    return float(t[i]), float(low[i, entry]), float(high[i, entry])
 
 
 def asked_at_nodes(given: Given, grid: Grid) -> tuple[Equation, ...]:

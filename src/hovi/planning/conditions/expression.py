@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import cached_property
 from itertools import combinations_with_replacement
 from typing import Any
@@ -12,7 +12,10 @@ import casadi as ca
 import numpy as np
 import numpy.typing as npt
 
+from hovi.discrete.cells import CHANGE
 from hovi.dynamics.point_function import PointFunction
+from hovi.effects.expressions.enclosure import Bounds, Enclosure
+from hovi.effects.expressions.interval_rules import Bound
 from hovi.errors import InputError, nearest, reason
 from hovi.planning.conditions.function import ARGUMENTS, Curvature, Function, Points, Slopes
 from hovi.robot.robot import Robot
@@ -60,6 +63,12 @@ class Expression(Function):
         """y, shape (P, size)."""
         return self._values(*self._arguments(at))[0].reshape(len(at.q), self.size)
 
+    def enclosure(self, box: Mapping[str, Bound]) -> Bounds | None:
+        """Bounds of y over boxes of its arguments, by their names; None if it has none."""
+        if not self._enclosure.known:
+            return None
+        return self._enclosure([box[x] for x in self._named], CHANGE)
+
     def slopes(self, at: Points) -> Slopes:
         """First derivatives in what y names."""
         found = self._slopes(*self._arguments(at))
@@ -79,6 +88,10 @@ class Expression(Function):
         functions = {name: getattr(self, name) for name in ("_values", "_slopes", "_curvature")}
         kept = ("_named", "_names", "_n", "_size", "_pairs")
         return functions | {name: getattr(self, name) for name in kept}
+
+    @cached_property
+    def _enclosure(self) -> Enclosure:
+        return Enclosure(self.function)
 
     def _arguments(self, at: Points) -> list[Array]:
         return [at.argument(x) for x in self._named]

@@ -10,6 +10,7 @@ from hovi.planning.conditions.state_difference import StateDifference
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.goal_clearance import goal_in_obstacle
 from hovi.planning.problem.limits import Limits
+from hovi.planning.problem.presolve.end_conditions import violated_at_end
 from hovi.planning.problem.presolve.end_torques import unavoidable_torque
 from hovi.planning.problem.presolve.moves import Waypoint, states_too_far_apart
 from hovi.planning.problem.problem import TrajectoryProblem
@@ -23,7 +24,8 @@ MARGIN_TOLERANCE = 1e-9
 def contradiction(problem: TrajectoryProblem, limits: Limits) -> str:
     """Why no motion between the problem's ends satisfies the limits; "" if none is found.
 
-    Checks the ends, the via points, and the mean velocities that the duration requires.
+    Checks the ends, the via points, the mean velocities that the duration requires, and conditions
+    at the ends.
     """
     if problem.unreachable:
         return problem.unreachable
@@ -33,6 +35,7 @@ def contradiction(problem: TrajectoryProblem, limits: Limits) -> str:
         or _end_in_obstacle(problem)
         or _duration_too_short(problem, limits)
         or unavoidable_torque(problem, limits)
+        or violated_at_end(problem)
     )
 
 

@@ -24,7 +24,7 @@ from hovi.errors import InputError, warn
 from hovi.planning.clearance.clearance import Clearance
 from hovi.planning.clearance.distances import Distances
 from hovi.planning.clearance.within_reach import distances_within_reach, with_gaps
-from hovi.planning.conditions.asked import asked_at_nodes, bounded_of, checked
+from hovi.planning.conditions.asked import asked_at_nodes, bounded_of, checked, require_ranges
 from hovi.planning.conditions.condition import Condition, Equation, Inequality, equation
 from hovi.planning.problem.conserved_momentum import free_fall_contradiction, without_redundancy
 from hovi.planning.problem.frame_goal import FrameGoal
@@ -101,6 +101,7 @@ class TrajectoryProblem(ProblemSummary):
         if self.periodic and (self.via or len(self.passive) > 0):
             raise InputError("periodic motions have no via points or passive joints: omit them.")
         object.__setattr__(self, "conditions", checked(self.conditions, self.coordinates))
+        require_ranges(self.bounds, self.grid.duration)
         require_supported(self, self.ld.k)
         of, limits = self.ld.lagrangian, self.limits
         if limits is not None and limits.on_torque_rate and isinstance(of, JerkLagrangian):
