@@ -85,13 +85,6 @@ _rule(
     "False",
 )
 _rule(
-    "last step within rounding",
-    "A last Newton step is accepted although the value rises within rounding.",
-    "_iterate",
-    "settled and value <= ended.value + 100 * noise",
-    "False",
-)
-_rule(
     "shift carries over",
     "The shift of the last subproblem is the first guess of the next.",
     "_iterate",
@@ -285,13 +278,6 @@ _rule(
     "True",
 )
 _rule(
-    "reopen slacks",
-    "Among obstacles a stalled solve moves its slacks inside and goes on.",
-    "_Iteration._reopened",
-    "not objective.reopens or self.reopenings >= MAX_REOPENINGS or outside > LARGEST_REOPENED",
-    "True",
-)
-_rule(
     "leave saddles within limits",
     "A saddle at the end is left along negative curvature, up to five times.",
     "_Iteration.run",
@@ -304,14 +290,6 @@ _rule(
     "_Iteration.run",
     "not (exact or definite)",
     "False",
-)
-_rule(
-    "end at a saddle that is not left",
-    "A solve that stalls at a saddle ends there as stationary.",
-    "_Iteration.run",
-    "self.ended.x is self.saddle",
-    "False",
-    times=2,
 )
 _rule(
     "end where stalled within limits",
@@ -451,13 +429,6 @@ _rule(
     "True",
 )
 _rule(
-    "larger penalties",
-    "The penalty grows where a larger one makes the Hessian definite without a shift.",
-    "_Search._factor",
-    "factor is None and model.factor(self.max_penalty, 0.0) is not None",
-    "False",
-)
-_rule(
     "loose equations far away",
     "Far from a minimum linearised equations are solved to 1e-2.",
     "_Search._step",
@@ -470,13 +441,6 @@ _rule(
     "_Search._accepted",
     "fraction * min(-slope, LARGE_SLOPE) ** 2.3 > before**1.1",
     "False",
-)
-_rule(
-    "leave saddles under equations",
-    "A saddle is left along the lowest tangent direction.",
-    "_Search._at_saddle",
-    "curvature >= 0.0",
-    "True",
 )
 _at("equations", "planning.solver.augmented_lagrangian_rounds")
 _rule(
@@ -682,15 +646,6 @@ _rule(
     "_solved_from_level",
     "along.rows is None",
     "False",
-)
-_at("warm starts", "optimize.nearby_bounded")
-_rule(
-    "refine a followed solution",
-    "Control points of a followed solution are halved.",
-    "_Newton.run",
-    "self.criteria.outside <= ROOM and self._refined()",
-    "False",
-    False,
 )
 _at("warm starts", "planning.solver.warm_start")
 _rule(

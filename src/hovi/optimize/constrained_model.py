@@ -185,13 +185,7 @@ class ConstrainedModel:
         Conjugate gradients on A K^-1 A^T, whose eigenvalues are nearly 1 / penalty.
         factor: of H + penalty A^T A + shift D. accuracy: of A s, relative to the residual.
         """
-        return self.solve_for(-self.gradient, factor, penalty, residual, accuracy)
-
-    def solve_for(
-        self, force: Array, factor: Factor, penalty: float, residual: Array, accuracy: float
-    ) -> tuple[Array, Array]:
-        """As `solve` for any right-hand side instead of minus the gradient."""
-        s = factor.solve(force - penalty * self.transposed_product(residual))
+        s = factor.solve(-self.gradient - penalty * self.transposed_product(residual))
         z = np.zeros_like(residual)
         r = residual + self.jacobian_product(s)
         p, square = r, float(r @ r)

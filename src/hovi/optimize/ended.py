@@ -90,8 +90,6 @@ class Ended(Generic[X, Z]):
     model: the last quadratic model, of a stationary point. convex: whether that was exact, with a
         Hessian that is positive definite, under equations on their tangent space.
     saddles: values at the saddles that were left along negative curvature.
-    penalty: weight of |c|^2 / 2 with which a minimum under equations has a positive definite
-        Hessian.
     saved: the last iterates before the mean product z gap had halved, with that product.
     corrected: whether some steps were corrected ones, without which it may end otherwise.
     kept: the point of least objective so far that keeps the bounds to KEPT, and the outputs there;
@@ -106,7 +104,6 @@ class Ended(Generic[X, Z]):
     model: QuadraticModel | None = None
     convex: bool = False
     saddles: list[float] = field(default_factory=list)
-    penalty: float = 1.0
     saved: list[tuple[float, X]] = field(default_factory=list)
     corrected: bool = False
     kept: tuple[X, Outputs] | None = None

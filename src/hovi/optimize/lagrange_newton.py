@@ -29,10 +29,6 @@ from hovi.system.interruption import raise_if_interrupted
 Array = npt.NDArray[np.float64]
 X = TypeVar("X")
 
-PENALTY_GROWTH = 10.0
-"""Factor to the next penalty, where the largest one makes the Hessian definite."""
-MAX_PENALTY_RATIO = 1e3
-"""Maximum penalty, relative to the initial one."""
 FIRST_SHIFT = 1e-5
 """The first shift, relative to the curvature."""
 SHIFT_DECREASE = 1.0 / 3.0
@@ -79,7 +75,7 @@ def minimize_under_equations(
     """
     outputs = objective.evaluate(start.x)
     z = np.zeros_like(outputs.y) if start.z is None else start.z
-    ended = Ended(start.x, outputs, z, penalty=objective.penalty)
+    ended = Ended(start.x, outputs, z)
     with ended.recorded_end(criteria.time_limit):
         _Search(objective, ended, criteria, report).run()
     return ended
@@ -125,7 +121,6 @@ class _Search(Generic[X]):
         self.size = size_of(ended.outputs.y)
         self.criteria = criteria
         self.report = report
-        self.max_penalty = MAX_PENALTY_RATIO * ended.penalty
         first = max(1.0, self.size)
         self.largest, self.small = 1e4 * first, 1e-4 * first
         self.filter = _Filter()
@@ -149,18 +144,13 @@ class _Search(Generic[X]):
 
     def _factor(self, model: ConstrainedModel) -> tuple[Factor | None, float]:
         """The factor of a definite K with the smallest shift; None where there is none."""
-        ended = self.ended
-        factor = model.factor(ended.penalty, 0.0)
-        if factor is None and model.factor(self.max_penalty, 0.0) is not None:
-            while factor is None and ended.penalty < self.max_penalty:
-                ended.penalty = min(PENALTY_GROWTH * ended.penalty, self.max_penalty)
-                factor = model.factor(ended.penalty, 0.0)
+        factor = model.factor(self.objective.penalty, 0.0)
         if factor is not None:
             return factor, 0.0
         known = self.shift > 0.0
         shift = SHIFT_DECREASE * self.shift if known else FIRST_SHIFT * model.curvature_scale
         for _ in range(MAX_SHIFTS):
-            factor = model.factor(ended.penalty, shift)
+            factor = model.factor(self.objective.penalty, shift)
             if factor is not None:
                 self.shift = shift
                 return factor, shift
@@ -171,7 +161,7 @@ class _Search(Generic[X]):
         """Take a step; whether the iteration ends."""
         ended, c = self.ended, self.ended.outputs.y
         accuracy = min(max(min(self.before, 1.0) ** 2, LEAST_ACCURACY), FIRST_ACCURACY)
-        step, change = model.solve(factor, ended.penalty, c, accuracy)
+        step, change = model.solve(factor, self.objective.penalty, c, accuracy)
         if not np.isfinite(step).all():
             return not self._restore()
         curvature = abs(float(step @ model.hessian_product(step)))
@@ -179,8 +169,9 @@ class _Search(Generic[X]):
         decrease = 0.5 * curvature + abs(float(new @ c))
         relative = decrease / max(abs(ended.value), 1e-300)
         settled = relative <= self.criteria.decrease and self.objective.feasible(ended.x)
-        if settled and shift > 0.0:
-            return self._at_saddle(model, factor, shift)
+        if settled and shift > 0.0:  # perhaps a saddle
+            ended.why = Reason.STATIONARY
+            return True
         trial = self._search_along(model, factor, step)
         value, fraction = (
             (ended.value, 0.0) if trial is None else (trial.outputs.value, trial.fraction)
@@ -259,7 +250,7 @@ class _Search(Generic[X]):
         size = size_of(residual)
         for _ in range(MAX_SECOND_ORDER_CORRECTIONS):
             total = total + residual
-            step, _ = model.solve(factor, ended.penalty, total, FIRST_ACCURACY)
+            step, _ = model.solve(factor, self.objective.penalty, total, FIRST_ACCURACY)
             x = self.objective.retract(ended.x, step, model)
             there = self.objective.evaluate(x)
             residual = there.y
@@ -287,54 +278,3 @@ class _Search(Generic[X]):
         ended.z, ended.why = found.z, Reason.ITERATION_LIMIT
         self.filter, self.shift, self.before = _Filter(), 0.0, math.inf
         return True
-
-    def _at_saddle(self, model: ConstrainedModel, factor: Factor, shift: float) -> bool:
-        """Leave a saddle along negative curvature; whether the iteration ends instead."""
-        ended = self.ended
-        ended.why = Reason.STATIONARY
-        along = self._lowest(model, factor)
-        curvature = float(along @ model.hessian_product(along))
-        if not self.criteria.escape_saddles or curvature >= 0.0:
-            return True
-        trial = self._along_curvature(model, factor, along, curvature)
-        if trial is None:
-            return True
-        ended.saddles.append(ended.value)
-        decrease = ended.value - trial.outputs.value
-        radius = trial.fraction
-        ended.steps.append(Iteration(trial.outputs.value, decrease, 1.0, shift, radius, self.size))
-        self._move(trial)
-        self.filter, self.before = _Filter(), math.inf
-        ended.why = Reason.ITERATION_LIMIT
-        return False
-
-    def _lowest(self, model: ConstrainedModel, factor: Factor) -> Array:
-        """The tangent direction of lowest curvature relative to D, by inverse iteration."""
-        none, penalty = np.zeros_like(self.ended.z), self.ended.penalty
-        u = model.plain.random_vector(seed=0)
-        for _ in range(4):
-            force = model.plain.metric_product(u)
-            u, _ = model.solve_for(force, factor, penalty, none, 1e-4)
-            u = u / model.length(u)
-        return u if float(model.gradient @ u) <= 0.0 else -u
-
-    def _along_curvature(
-        self, model: ConstrainedModel, factor: Factor, along: Array, curvature: float
-    ) -> _Trial | None:
-        """A point on c = 0 with a smaller value, along a direction of negative curvature."""
-        ended, length = self.ended, self.criteria.radius
-        none = np.zeros_like(model.gradient)
-        weight = 2.0 * float(np.linalg.norm(ended.z))
-        while length > LEAST_FRACTION * self.criteria.radius:
-            step = length * along
-            x = self.objective.retract(ended.x, step, model)
-            there = self.objective.evaluate(x)
-            if np.isfinite(there.y).all():
-                back, _ = model.solve_for(none, factor, ended.penalty, there.y, 1e-4)
-                x = self.objective.retract(ended.x, step + back, model)
-                there = self.objective.evaluate(x)
-                merit = there.value + weight * size_of(there.y)
-                if merit < ended.value + 0.25 * length**2 * curvature:
-                    return _Trial(x, there, length, True)
-            length *= 0.5
-        return None

@@ -59,8 +59,8 @@ def follow_bounded(
     It ends as DIVERGED where the steps do not converge, or not to a minimum.
     start.z: of the solution of a similar problem with as many outputs.
     criteria: `barrier` is the last barrier parameter; it ends where the next step predicts, and the
-        distance of slacks from outputs means, less than `enough` of the objective. If outputs may
-        be further than ROOM `outside` at the end, they are not refined.
+        distance of slacks from outputs means, less than `enough` of the objective. Outputs are
+        not refined.
     """
     assert start.z is not None
     ended = Ended(start.x, objective.outputs(start.x), start.z, Reason.DIVERGED)
@@ -108,8 +108,6 @@ class _Newton(Generic[X]):
                 return
             step, slope, length = model.descend(factor)
             if self._is_solved(-0.5 * slope):
-                if self.criteria.outside <= ROOM and self._refined():
-                    continue
                 ended.z = ended.z.at_outputs(self.objective.bounds, ended.outputs.y)
                 ended.model, ended.why = model, Reason.STATIONARY
                 ended.saved.append((ended.z.mu, ended.x))
@@ -144,17 +142,3 @@ class _Newton(Generic[X]):
             return False
         enough = max(self.criteria.decrease, self.criteria.enough) * abs(ended.outputs.value)
         return self.outside <= self.criteria.outside and max(decrease, self.work) <= enough
-
-    def _refined(self) -> bool:
-        """Whether outputs were replaced by others."""
-        ended, objective = self.ended, self.objective
-        found = objective.refine(ended.x, ended.z.mu / self.density)
-        if found is None:
-            return False
-        before = ended.outputs.y[found.kept]
-        ended.outputs, ended.kept = objective.outputs(ended.x), None
-        y = ended.outputs.y
-        bounds = objective.bounds.shrunk(ROOM)
-        refined = ended.z.refined(bounds, y, found.kept, found.origin, before)
-        ended.z = refined.recentered(self.weight, refined.mu)
-        return True

@@ -147,7 +147,7 @@ def _iterate(
         if report is not None:
             report(len(ended.steps), min(value, ended.value))
         radius = next_radius(radius, trial.norm, ratio)
-        accepted = ratio > 1e-4 or (settled and value <= ended.value + 100 * noise)
+        accepted = ratio > 1e-4
         if accepted:
             if trial.along_negative_curvature and stationary:
                 ended.saddles.append(ended.value)

@@ -40,7 +40,7 @@ from hovi.system.deadline import Deadline, OutOfTimeError
 Array = npt.NDArray[np.float64]
 
 PENALTY_FACTORS = 1.0, 1e2, 1e4
-"""Factors of the last penalty with which negative eigenvalues are counted; the least counts."""
+"""Factors of the penalty with which negative eigenvalues are counted; the least counts."""
 
 NEAR_ACCURACY = 1e-2
 """Accuracy of the linearised equations in the step that shows whether a minimum is near."""
@@ -121,7 +121,7 @@ class _Search:
         start = Start(path, multipliers)
         found = minimize_under_equations(objective, start, self.left, self.report)
         self.history += found.steps
-        found.saddles = saddles + found.saddles
+        found.saddles = saddles
         if found.why is Reason.DIVERGED:
             return None
         return self._result(objective, found, _negative_eigenvalues(objective, found))
@@ -186,9 +186,9 @@ def _negative_eigenvalues(objective: ConstrainedAction, found: Ended[DiscretePat
         return 0
     try:
         model = objective.model(found.x, found.z)
-        if model.factor(found.penalty, 0.0) is not None:
+        if model.factor(objective.penalty, 0.0) is not None:
             return 0
-        counts = [model.negative_eigenvalues(found.penalty * f) for f in PENALTY_FACTORS]
+        counts = [model.negative_eigenvalues(objective.penalty * f) for f in PENALTY_FACTORS]
         return min(counts)
     except OutOfTimeError:
         return -1
