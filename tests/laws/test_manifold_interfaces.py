@@ -196,7 +196,7 @@ def test_second_derivatives_of_a_joint_condition_match_finite_differences() -> N
     robot = load_robot(with_arm("free-flyer"))
     q, target = configurations(robot, 2, 5)
     v, n = np.zeros(robot.nv), robot.nv
-    error = StateDifference(robot, target, v, np.ones((2, n), dtype=bool))
+    error = StateDifference(robot, (target, v), np.ones((2, n), dtype=bool))
     _, J = linear(error, q, v)
     h = 1e-5
     for i, e in enumerate(np.eye(n)):

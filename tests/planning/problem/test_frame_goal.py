@@ -81,7 +81,7 @@ def test_the_derivatives_are_taken_along_the_configuration_space() -> None:
     v, held = np.zeros(robot.nv), np.ones((2, robot.nv), dtype=bool)
     for error in (
         goals(robot, robot.tip_frame, target)["pose"].difference(robot),
-        StateDifference(robot, target, v, held),
+        StateDifference(robot, (target, v), held),
     ):
         weights = random.standard_normal(error.size)
         J = linear(error, q, v)[1][:, 0]

@@ -62,7 +62,7 @@ def test_closeness_is_the_smallest_distance_from_the_bounds(
     limits = as_limits(two_link, LIMITS)
     room = closeness(motion, limits)
     assert room.shape == (4, 2)
-    every = [excess_along(motion, each).worst for each in limit_conditions(limits, 2, None)]
+    every = [float(excess_along(motion, each).max()) for each in limit_conditions(limits, 2, None)]
     assert room.min() == -max(every)
     assert np.isinf(closeness(motion, as_limits(two_link, {"base": "none", "q": 1.5}))[1:]).all()
 
@@ -159,7 +159,7 @@ def _require_the_highest(
     np.testing.assert_allclose(motion.sample(s).v[:, 0], v(s), atol=1e-10)
     limits = as_limits(robot, {"base": "none", "v": [1.0, 1.0]})
     (velocity,) = limit_conditions(limits, 2, None)
-    upper = excess_along(motion, velocity).sides[1]
+    upper = excess_along(motion, velocity)[1]
     assert 2 * upper[0, 0] == pytest.approx(v(s).max() - 1.0, abs=1e-8)
 
 
@@ -181,7 +181,7 @@ def test_a_first_look_finds_the_same_excess_where_a_bound_may_be_exceeded(
     peak = np.abs(motion.sample(np.linspace(0.0, motion.duration, 5001)).tau).max(axis=0)
     limits = as_limits(two_link, LIMITS | {"tau": (tau * peak).tolist()})
     torques = limit_conditions(limits, 2, None)[-1]
-    some, every = excess_of(motion, torques), excess_along(motion, torques).sides
+    some, every = excess_of(motion, torques), excess_along(motion, torques)
     near = every > -0.02
     np.testing.assert_array_equal(some[near], every[near])
     assert (some <= every).all()

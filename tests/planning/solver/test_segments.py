@@ -270,7 +270,7 @@ def test_limits_are_checked_in_each_segment_against_its_own() -> None:
     lower, upper = np.full((2, motion.grid.intervals, 4, 2), -np.inf)
     for each in limit_conditions(limits, motion.grid.order, None):
         assert isinstance(each.on, LimitRange)
-        lower[:, each.on.row], upper[:, each.on.row] = excess_along(motion, each).sides
+        lower[:, each.on.row], upper[:, each.on.row] = excess_along(motion, each)
     t = np.linspace(0.0, 1.0, 20_001)
     for segment, span in zip(parts, (slice(0, 6), slice(6, 15)), strict=True):
         for k in range(span.start, span.stop):

@@ -18,7 +18,7 @@ from hovi.planning.conditions.sets import Between
 from hovi.robot.space.coordinates import Coordinates
 from hovi.scene.segmented_lagrangian import NODE_TOLERANCE
 
-Given = Sequence[Condition[Any, Any]]
+Conditions = Sequence[Condition[Any, Any]]
 
 
 def as_conditions(given: Any) -> tuple[Condition[Any, Any], ...]:
@@ -38,7 +38,7 @@ def checked(given: Any, coordinates: Coordinates) -> tuple[Condition[Any, Any], 
     return tuple(with_function(each, coordinates) for each in as_conditions(given))
 
 
-def require_ranges(given: Given, duration: float) -> None:
+def require_ranges(given: Conditions, duration: float) -> None:
     """Raise InputError for bounds that leave no value at a time of a motion, or fail there."""
     for each in given:
         if isinstance(each.on, Between) and each.on.varies:
@@ -63,7 +63,7 @@ def empty_range(on: Between, duration: float) -> tuple[float, float, float] | No
     return float(t[i]), float(low[i, entry]), float(high[i, entry])
 
 
-def asked_at_nodes(given: Given, grid: Grid) -> tuple[Equation, ...]:
+def asked_at_nodes(given: Conditions, grid: Grid) -> tuple[Equation, ...]:
     """The equations at the nodes of a grid. Raises InputError where the grid has no such node."""
     found = []
     for each in given:
@@ -80,13 +80,13 @@ def asked_at_nodes(given: Given, grid: Grid) -> tuple[Equation, ...]:
     return tuple(found)
 
 
-def times_of(given: Given) -> list[float]:
+def times_of(given: Conditions) -> list[float]:
     """The times at which grids need nodes, in [s]."""
     places = (each.where for each in given if isinstance(each.where, AtTimes))
     return [float(time) for place in places for time in np.asarray(place.times)]
 
 
-def bounded_of(given: Given) -> tuple[Inequality, ...]:
+def bounded_of(given: Conditions) -> tuple[Inequality, ...]:
     """Those that hold at all times."""
     return tuple(each for each in given if isinstance(each.on, Between))
 

@@ -15,15 +15,15 @@ from hovi.checks.kinds import is_number
 from hovi.checks.shapes import numbers_of
 from hovi.discrete.grid import DiscretePath
 from hovi.errors import InputError
-from hovi.planning.conditions.expression import Given, function_of
-from hovi.planning.conditions.function import Function, at_state, bend, linear
+from hovi.planning.conditions.expression import FunctionLike, function_of
+from hovi.planning.conditions.function import Function, bend, linear
 from hovi.planning.conditions.places import Along, AtNode, AtPoints, AtTimes, Where
-from hovi.planning.conditions.sets import Between, Equal, Range
+from hovi.planning.conditions.sets import Between, Equal, TwoSided
 from hovi.robot.space.coordinates import Coordinates
 from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
-Values = TypeVar("Values", bound=Equal | Range, covariant=True)
+Values = TypeVar("Values", bound=Equal | TwoSided, covariant=True)
 Place = TypeVar("Place", bound=Where, covariant=True)
 
 TOLERANCE = 1e-6
@@ -52,7 +52,7 @@ class Condition(Generic[Values, Place]):
     Raises InputError for anything else.
     """
 
-    function: Given
+    function: FunctionLike
     on: Values
     where: Place = EVERYWHERE
     name: str = "given"
@@ -67,7 +67,7 @@ class Condition(Generic[Values, Place]):
                 "the function of a condition must be a formula, a function of CasADi symbols or a "
                 f"Function, got {self.function!r}."
             )
-        if not isinstance(self.on, Equal | Range):
+        if not isinstance(self.on, Equal | TwoSided):
             raise InputError(
                 f"a condition needs a hovi.Between or a hovi.Equal, got {self.on!r:.200}."
             )
@@ -88,7 +88,7 @@ class Condition(Generic[Values, Place]):
                 raise InputError(
                     f"the scale of condition {self.name!r} must be positive, got {self.scale!r}."
                 )
-        elif isinstance(self.on, Range) and self.on.varies:
+        elif isinstance(self.on, TwoSided) and self.on.varies:
             raise InputError(
                 f"condition {self.name!r} has bounds that are functions of time and needs a "
                 "`scale`: the size of its values that counts as large."
@@ -103,7 +103,7 @@ class Condition(Generic[Values, Place]):
     @property
     def timed(self) -> bool:
         """Whether it changes with time, whatever the motion; of a condition `with_function`."""
-        return "t" in self.y.needs or (isinstance(self.on, Range) and self.on.varies)
+        return "t" in self.y.needs or (isinstance(self.on, TwoSided) and self.on.varies)
 
 
 def _require_place(given: Condition[Any, Any]) -> None:
@@ -113,7 +113,7 @@ def _require_place(given: Condition[Any, Any]) -> None:
             f"condition {given.name!r} is an equation along the whole motion, which is not "
             "supported: use `where = hovi.AtTimes(...)`, or a hovi.Between with some room."
         )
-    if isinstance(given.on, Range) and isinstance(given.where, AtNode | AtTimes | Along):
+    if isinstance(given.on, TwoSided) and isinstance(given.where, AtNode | AtTimes | Along):
         raise InputError(
             f"condition {given.name!r} has bounds, which hold at all times: leave `where` out."
         )
@@ -163,7 +163,7 @@ def _require_size(
         )
 
 
-def scales(each: Condition[Range, Any]) -> Array:
+def scales(each: Condition[TwoSided, Any]) -> Array:
     """The scale of every entry, shape (size,): as given, or the range between the bounds."""
     if each.scale is not None:
         return np.broadcast_to(np.asarray(each.scale, dtype=float), (each.y.size,))
@@ -182,7 +182,7 @@ def equation(function: Function, node: int, time: float) -> Equation:
 
 def residual(each: Equation, x: DiscretePath) -> Array:
     """c - value at a path, shape (k,)."""
-    return linear_at(each, *each.where.state(x))[0]
+    return each.on.missed(each.y.values(each.where.points(x))[0])
 
 
 def linear_at(each: Equation, q: Array, v: Array) -> tuple[Array, Array]:
@@ -196,10 +196,15 @@ def bend_at(each: Equation, q: Array, v: Array, weights: Array) -> Array:
     return bend(each.y, q, v, weights, each.where.time)
 
 
+def missed(each: Equation, x: DiscretePath) -> str:
+    """By how much an equation is missed at a path, as a clause; "" if it is satisfied."""
+    size = np.max(np.abs(residual(each, x)), initial=0.0)
+    return "" if size <= each.tolerance and not is_spurious(each, x) else describe(each, x)
+
+
 def describe(each: Equation, x: DiscretePath) -> str:
     """By how much an equation is missed at a path, as a clause."""
-    at = at_state(*each.where.state(x), each.where.time)
-    return each.y.describe(at, residual(each, x))
+    return each.y.describe(each.where.points(x), residual(each, x))
 
 
 def whose(each: Equation) -> str:
@@ -209,4 +214,4 @@ def whose(each: Equation) -> str:
 
 def is_spurious(each: Equation, x: DiscretePath) -> bool:
     """Whether an equation holds at a path at a root where what is meant does not."""
-    return each.y.is_spurious(at_state(*each.where.state(x), each.where.time))
+    return each.y.is_spurious(each.where.points(x))

@@ -13,8 +13,7 @@ from hovi.dynamics.torque_rate import TorqueRate
 from hovi.planning.conditions.condition import Condition, scales
 from hovi.planning.conditions.function import Points
 from hovi.planning.conditions.narrow import NO_BOUND, PEAK_FRACTION, NarrowCells, features_of
-from hovi.planning.conditions.sets import Between, Range
-from hovi.system.dataclass import dataclass
+from hovi.planning.conditions.sets import Between, TwoSided
 from hovi.system.deadline import raise_if_late
 
 Array = npt.NDArray[np.float64]
@@ -37,39 +36,25 @@ COARSE = 4, 2
 modes, and on others."""
 
 
-@dataclass(frozen=True, eq=False)
-class Excess:
-    """Largest excess over each bound in each interval, as a fraction of the scale; negative inside.
-
-    sides: over lower and upper bounds, shape (2, N, size). at: relative position in the interval of
-        that excess, in [0, 1], of the same shape.
-    """
-
-    sides: Array
-    at: Array
-
-    @property
-    def worst(self) -> float:
-        """The largest excess over any bound."""
-        return float(self.sides.max())
+Excess = tuple[Array, Array]
+"""The largest excess over lower and upper bounds in each interval, and its position there."""
 
 
-def excess_along(motion: Trajectory, given: Condition[Range, Any]) -> Excess:
-    """The extremes of a function along the interpolant, compared with its bounds.
+def excess_along(motion: Trajectory, given: Condition[TwoSided, Any]) -> Array:
+    """The largest excess over the lower and upper bounds in every interval, (2, N, size).
 
+    As a fraction of the scale; negative inside.
     Every interval is sampled, and again more densely around all extremes that are near a bound, and
     wherever the curvature of the samples allows an excess between them: a motion along a bound has
     several extremes, and the largest one is not always next to the largest sample.
     """
-    every = Cells.of(motion.grid.intervals, 1)
-    return _with_narrow(_excess_in(every, motion, given), motion, given)
+    return _found_along(motion, given)[0]
 
 
-def excess_of(motion: Trajectory, given: Condition[Range, Any]) -> Array:
-    """The excess over the lower and upper bounds in every interval, (2, N, size).
+def excess_of(motion: Trajectory, given: Condition[TwoSided, Any]) -> Array:
+    """As `excess_along` wherever that may be positive.
 
-    It is that of `excess_along` wherever that may be positive; elsewhere it is that of a few
-    samples, which are further from their bounds than neighboring ones differ.
+    Elsewhere that of a few samples, which are further from their bounds than neighbors differ.
     """
     raise_if_late()
     N, grid = motion.grid.intervals, motion.grid
@@ -81,19 +66,19 @@ def excess_of(motion: Trajectory, given: Condition[Range, Any]) -> Array:
     safe = sides + change <= -REFINEMENT_FRACTION  # false where it is no number
     near = np.flatnonzero(~safe.all(axis=(0, 2)))
     if len(near) > 0:
-        sides[:, near] = _excess_in(Cells.of(N, 1).chosen(near), motion, given).sides
-    return _with_narrow(Excess(sides, np.zeros_like(sides)), motion, given).sides
+        sides[:, near] = _excess_in(Cells.of(N, 1).chosen(near), motion, given)[0]
+    return _with_narrow((sides, np.zeros_like(sides)), motion, given)[0]
 
 
-def worst(motion: Trajectory, given: Condition[Range, Any]) -> tuple[float, str]:
+def worst(motion: Trajectory, given: Condition[TwoSided, Any]) -> tuple[float, str]:
     """The largest excess as a fraction of the scale, and the value, time and bound in words."""
-    found = excess_along(motion, given)
-    side, k, entry = np.unravel_index(int(np.argmax(found.sides)), found.sides.shape)
-    y, low, high, t = _values(motion, given, np.array([k]), found.at[side, [k], entry])
+    sides, at = _found_along(motion, given)
+    side, k, entry = np.unravel_index(int(np.argmax(sides)), sides.shape)
+    y, low, high, t = _values(motion, given, np.array([k]), at[side, [k], entry])
     bound = (low, high)[side][0, entry]
     named = given.y.named(int(entry))
     subject, unit = named or (in_words(given, int(entry)), given.unit)
-    return float(found.sides[side, k, entry]), (
+    return float(sides[side, k, entry]), (
         f"{subject} reaches {y[0, entry]:.4g}{unit and f' {unit}'} at t = {t[0]:.3g} s, its "
         f"{'limit' if named else 'bound'} is {bound:.4g}"
     )
@@ -123,14 +108,14 @@ def in_words(given: Condition[Any, Any], entry: int) -> str:
 
 
 def _values(
-    motion: Trajectory, given: Condition[Range, Any], k: Index, s: Array
+    motion: Trajectory, given: Condition[TwoSided, Any], k: Index, s: Array
 ) -> tuple[Array, Array, Array, Array]:
     """y and its bounds at relative positions s in intervals k, (M, size) each, and the times."""
     at, t = _points(motion, k, s, given.y.needs), motion.t
     return given.y.values(at), *given.on.at(at.t, given.y.size, t[k + 1] / 2 + t[k] / 2), at.t
 
 
-def _over(motion: Trajectory, given: Condition[Range, Any], k: Index, s: Array) -> Array:
+def _over(motion: Trajectory, given: Condition[TwoSided, Any], k: Index, s: Array) -> Array:
     """low - y and y - high over the scale at relative positions s in intervals k, (2, M, size)."""
     y, low, high, _ = _values(motion, given, k, s)
     return np.maximum(np.stack([low - y, y - high]) / scales(given), -NO_BOUND)
@@ -162,104 +147,94 @@ def _narrow(motion: Trajectory, given: Condition[Between, Any]) -> NarrowCells:
     return NarrowCells(given, motion.grid, over, points)
 
 
-def _with_narrow(found: Excess, motion: Trajectory, given: Condition[Range, Any]) -> Excess:
+def _found_along(motion: Trajectory, given: Condition[TwoSided, Any]) -> Excess:
+    return _with_narrow(_excess_in(Cells.of(motion.grid.intervals, 1), motion, given), motion, given)
+
+
+def _with_narrow(found: Excess, motion: Trajectory, given: Condition[TwoSided, Any]) -> Excess:
     """The same, and what is exceeded in narrow cells; limits need none."""
     if not isinstance(given.on, Between):
         return found
     cells = _narrow(motion, cast(Condition[Between, Any], given)).cells
     if len(cells) == 0:
         return found
-    inside, sides, at = _excess_in(cells, motion, given), found.sides.copy(), found.at.copy()
-    for side, cell, entry in np.argwhere(inside.sides > sides[:, cells.interval]):
-        place, over = (side, cells.interval[cell], entry), inside.sides[side, cell, entry]
+    (inside, s), (sides, at) = _excess_in(cells, motion, given), found
+    for side, cell, entry in np.argwhere(inside > sides[:, cells.interval]):
+        place, over = (side, cells.interval[cell], entry), inside[side, cell, entry]
         if over > sides[place]:
-            sides[place], at[place] = over, cells.position(cell, inside.at[side, cell, entry])
-    return Excess(sides, at)
+            sides[place], at[place] = over, cells.position(cell, s[side, cell, entry])
+    return sides, at
 
 
-def _excess_in(cells: Cells, motion: Trajectory, given: Condition[Range, Any]) -> Excess:
-    """As `excess_along`, in cells, with positions in these."""
+def _excess_in(cells: Cells, motion: Trajectory, given: Condition[TwoSided, Any]) -> Excess:
+    """In cells, with positions in these, (2, P, size) each."""
     raise_if_late()
     P = len(cells)
     k, s = np.repeat(np.arange(P), SAMPLES), np.tile(POSITIONS, P)
     over = _over(motion, given, cells.interval[k], cells.position(k, s))
-    sides = enumerate(over.reshape(2, P, SAMPLES, -1))
-    found = [_Side(motion, given, cells, i).extremes(each) for i, each in sides]
-    largest, at = (np.stack(each) for each in zip(*found, strict=True))
-    return Excess(largest, at)
-
-
-@dataclass(frozen=True, eq=False)
-class _Side:
-    """The lower bounds of a condition, 0, or its upper ones, 1, in cells."""
-
-    motion: Trajectory
-    given: Condition[Range, Any]
-    cells: Cells
-    side: int
-
-    def extremes(self, excess: Array) -> tuple[Array, Array]:
-        """The largest excess in each cell, and its relative position, (P, size) each.
-
-        excess: of all samples, shape (P, SAMPLES, size).
-        """
+    over = over.reshape(2, P, SAMPLES, -1)
+    index = np.argmax(over, axis=2)
+    largest = np.take_along_axis(over, index[:, :, None], axis=2)[:, :, 0]
+    at = POSITIONS[index]
+    extremes = np.argwhere(_near_extremes(over, largest) | _may_exceed(over, given.tolerance))
+    for first in range(0, len(extremes), BATCH):  # in batches, since a deadline may be in force
         raise_if_late()
-        index = np.argmax(excess, axis=1)
-        largest = np.take_along_axis(excess, index[:, None], axis=1)[:, 0]
-        at = POSITIONS[index]
-        k, sample, entry = np.nonzero(
-            _near_extremes(excess, largest) | _may_exceed(excess, self.given.tolerance)
-        )
-        for first in range(0, len(k), BATCH):  # in batches, since a deadline may be in force
-            raise_if_late()
-            one = slice(first, first + BATCH)
-            rows, entries = k[one], entry[one]
-            found, s = self._refined(rows, sample[one], entries)
-            for i in np.argsort(found):  # the largest of each cell and entry comes last
-                place = rows[i], entries[i]
-                if found[i] >= largest[place]:
-                    largest[place], at[place] = found[i], s[i]
-        return largest, at
+        side, k, sample, entry = extremes[first : first + BATCH].T
+        found, s = _refined(motion, given, cells.chosen(k), side, sample, entry)
+        for i in np.argsort(found):  # the largest of each cell and entry comes last
+            place = side[i], k[i], entry[i]
+            if found[i] >= largest[place]:
+                largest[place], at[place] = found[i], s[i]
+    return largest, at
 
-    def _refined(self, k: Index, sample: Index, entry: Index) -> tuple[Array, Array]:
-        """The excess at M extremes and their positions, from three denser samplings around them.
 
-        k: cells. sample: the extreme samples. entry: of the function. All (M,).
-        """
-        rows, every = np.arange(len(k)), np.repeat(k, REFINED_SAMPLES)
-        begin = POSITIONS[np.maximum(sample - 1, 0)]
-        end = POSITIONS[np.minimum(sample + 1, SAMPLES - 1)]
-        intervals = self.cells.interval[every]
-        for _ in range(3):
-            step = (end - begin) / (REFINED_SAMPLES - 1)
-            around = np.minimum(begin[:, None] + step[:, None] * np.arange(REFINED_SAMPLES), 1.0)
-            s = self.cells.position(every, around.ravel())
-            over = _over(self.motion, self.given, intervals, s)[self.side]
-            excess = over.reshape(len(k), REFINED_SAMPLES, -1)[rows, :, entry]
-            best = np.argmax(excess, axis=1)
-            at = around[rows, best]
-            begin, end = np.maximum(at - step, 0.0), np.minimum(at + step, 1.0)
-        return excess[rows, best], at
+def _refined(
+    motion: Trajectory,
+    given: Condition[TwoSided, Any],
+    cells: Cells,
+    side: Index,
+    sample: Index,
+    entry: Index,
+) -> tuple[Array, Array]:
+    """The excess at M extremes and their positions, from three denser samplings around them.
+
+    cells: of each. side: 0 for lower bounds, 1 for upper ones. sample: the extreme samples.
+    entry: of the function. All (M,).
+    """
+    rows = np.arange(len(cells))
+    every = np.repeat(rows, REFINED_SAMPLES)
+    begin = POSITIONS[np.maximum(sample - 1, 0)]
+    end = POSITIONS[np.minimum(sample + 1, SAMPLES - 1)]
+    for _ in range(3):
+        step = (end - begin) / (REFINED_SAMPLES - 1)
+        around = np.minimum(begin[:, None] + step[:, None] * np.arange(REFINED_SAMPLES), 1.0)
+        s = cells.position(every, around.ravel())
+        over = _over(motion, given, cells.interval[every], s)
+        excess = over.reshape(2, len(rows), REFINED_SAMPLES, -1)[side, rows, :, entry]
+        best = np.argmax(excess, axis=1)
+        at = around[rows, best]
+        begin, end = np.maximum(at - step, 0.0), np.minimum(at + step, 1.0)
+    return excess[rows, best], at
 
 
 def _near_extremes(excess: Array, largest: Array) -> npt.NDArray[np.bool_]:
     """Samples that are local extremes, and are the largest of their entry or next to its bound.
 
-    excess: of the samples, shape (N, SAMPLES, K). largest: of each interval, shape (N, K).
+    excess: of the samples, shape (2, P, SAMPLES, K). largest: of each cell, (2, P, K).
     """
-    padded = np.pad(excess, ((0, 0), (1, 1), (0, 0)), constant_values=-np.inf)
+    padded = np.pad(excess, ((0, 0), (0, 0), (1, 1), (0, 0)), constant_values=-np.inf)
     with np.errstate(invalid="ignore"):
-        peak = (excess >= padded[:, :-2]) & (excess >= padded[:, 2:])
-    highest = (excess == largest[:, None]) & (excess > -REFINEMENT_FRACTION)
+        peak = (excess >= padded[:, :, :-2]) & (excess >= padded[:, :, 2:])
+    highest = (excess == largest[:, :, None]) & (excess > -REFINEMENT_FRACTION)
     return np.asarray(peak & np.isfinite(excess) & (highest | (excess > -PEAK_FRACTION)))
 
 
 def _may_exceed(excess: Array, tolerance: float) -> npt.NDArray[np.bool_]:
     """Samples next to which a parabola through three of them may exceed a bound.
 
-    excess: of the samples, shape (N, SAMPLES, K). tolerance: of an excess.
+    excess: of the samples, shape (2, P, SAMPLES, K). tolerance: of an excess.
     """
     with np.errstate(invalid="ignore"):
-        bend = np.abs(np.diff(excess, 2, axis=1))
-        bend = np.concatenate([bend[:, :1], bend, bend[:, -1:]], axis=1)
+        bend = np.abs(np.diff(excess, 2, axis=2))
+        bend = np.concatenate([bend[:, :, :1], bend, bend[:, :, -1:]], axis=2)
         return np.asarray(excess + 0.5 * bend > tolerance) & np.isfinite(excess)

@@ -24,7 +24,7 @@ from hovi.robot.space.configuration_space import ConfigurationSpace
 from hovi.robot.space.coordinates import Coordinates
 
 Array = npt.NDArray[np.float64]
-Given = str | Callable[..., Any] | Function
+FunctionLike = str | Callable[..., Any] | Function
 """A formula, a function of CasADi symbols whose arguments are some of ARGUMENTS, or a Function."""
 _JERK = "jerk", "j", "dtau", "torque_rate", "tau_rate"
 
@@ -139,7 +139,7 @@ class Expression(Function):
         return self._function("ddy", list(blocks.values()), weights)
 
 
-def function_of(given: Given, name: str, coordinates: Coordinates) -> Function:
+def function_of(given: FunctionLike, name: str, coordinates: Coordinates) -> Function:
     """A function of a robot's motion, or of other coordinates.
 
     name: of the condition, in messages. Raises InputError or SceneError for formulas and functions

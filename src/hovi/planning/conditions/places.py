@@ -8,6 +8,7 @@ import numpy.typing as npt
 from hovi.checks.shapes import numbers_of
 from hovi.discrete.grid import DiscretePath
 from hovi.errors import InputError
+from hovi.planning.conditions.function import Points
 from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
@@ -15,17 +16,24 @@ Array = npt.NDArray[np.float64]
 
 @dataclass(frozen=True)
 class AtNode:
-    """At one node of a grid, where a condition is a function of q and v.
+    """At one node of a grid, where a condition is a function of q, v and further rates.
 
-    node: its index. time: in [s].
+    node: its index. time: in [s]. given: whether what is asked is no unknown there, as at ends.
     """
 
     node: int
     time: float
+    given: bool = False
 
     def state(self, x: DiscretePath) -> tuple[Array, Array]:
         """q (nq,) and v (nv,) of a path there."""
         return x.q[self.node], x.v[self.node]
+
+    def points(self, x: DiscretePath) -> Points:
+        """The motion there."""
+        q, v = self.state(x)
+        more = dict(zip(("a", "jerk"), x.rates[self.node, 1:, None], strict=False))
+        return Points(q[None], v[None], np.array([self.time]), **more)
 
 
 @dataclass(frozen=True, eq=False)

@@ -40,7 +40,7 @@ class Equal:
         return np.asarray(y - np.asarray(self.value))
 
 
-class Range(ABC):
+class TwoSided(ABC):
     """What is between two bounds, which may change with time."""
 
     @property
@@ -58,7 +58,7 @@ class Range(ABC):
 
 @check_arguments
 @dataclass(frozen=True, eq=False)
-class Between(Range):
+class Between(TwoSided):
     """lower <= y <= upper.
 
     lower, upper: a number, one for each entry of y, or a function of the time that returns either;
@@ -93,7 +93,7 @@ class Between(Range):
         return callable(self.lower) or callable(self.upper)
 
     def at(self, t: Array, size: int | None, within: Array | None = None) -> tuple[Array, Array]:
-        """See Range.
+        """See TwoSided.
 
         Raises InputError for another number of bounds than size, and for bounds that are NaN.
         """

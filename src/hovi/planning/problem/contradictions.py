@@ -54,8 +54,7 @@ def _via_leaves(problem: TrajectoryProblem, limits: Limits) -> str:
         via, t = each.y, each.where.time
         if not isinstance(via, StateDifference) or limits.parts:  # of both where segments meet
             continue
-        jet, window = (via.target, via.velocity), limits.window * T
-        state = EndState.of(on, limits, jet, via.held, T, window, scene, t)
+        state = EndState.of(on, limits, via.jet, via.held, T, limits.window * T, scene, t)
         sentence = refused(state, f"via point at {t:g} s", passed=True)
         if sentence:
             return sentence

@@ -152,7 +152,7 @@ def via_differences(via: Via, reached: GoalState, coordinates: Coordinates) -> t
     q, v = reached.state.on(coordinates, "via")
     held = ~reached.state.free_on(coordinates, "via")
     held[1] &= reached.state.v is not None
-    return (StateDifference(coordinates, q, v, held),)
+    return (StateDifference(coordinates, (q, v), held),)
 
 
 @lru_cache(maxsize=256)

@@ -12,7 +12,7 @@ from hovi.planning.conditions.condition import TOLERANCE, Condition
 from hovi.planning.conditions.excess import excess_along
 from hovi.planning.conditions.joint_quantity import DERIVATIVES, JointQuantity
 from hovi.planning.conditions.places import AtPoints, ControlPoints
-from hovi.planning.conditions.sets import Range
+from hovi.planning.conditions.sets import TwoSided
 from hovi.planning.problem.limits import Limits
 from hovi.robot.robot import Robot
 from hovi.robot.space.configuration_space import ConfigurationSpace
@@ -28,7 +28,7 @@ AT_LIMIT = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
-class LimitRange(Range):
+class LimitRange(TwoSided):
     """The bounds of some joints in a row of limits: of each segment, wider for what is excused."""
 
     limits: Limits
@@ -36,7 +36,7 @@ class LimitRange(Range):
     joints: npt.NDArray[np.intp]
 
     def at(self, t: Array, size: int | None, within: Array | None = None) -> tuple[Array, Array]:
-        """See Range."""
+        """See TwoSided."""
         low, high = self.limits.at(t if within is None else within)
         if self.limits.excused:
             low, high = low - self.limits.wider(-1, t), high + self.limits.wider(1, t)
@@ -45,7 +45,7 @@ class LimitRange(Range):
 
 def limit_conditions(
     limits: Limits, order: int, space: ConfigurationSpace | None, on: Coordinates | None = None
-) -> list[Condition[Range, ControlPoints | AtPoints]]:
+) -> list[Condition[TwoSided, ControlPoints | AtPoints]]:
     """The conditions that limits are: on polynomials by control points, then on others.
 
     order: of the Lagrangian. space: of the configurations; None for a vector space. on: has names
@@ -67,7 +67,7 @@ def _condition(
     where: ControlPoints | AtPoints,
     space: ConfigurationSpace | None,
     on: Coordinates | None,
-) -> Condition[Range, Any]:
+) -> Condition[TwoSided, Any]:
     """That of some joints in a row of limits."""
     y = JointQuantity(limits.kinds[row], joints, space, on)
     scale, tolerance = limits.ranges[row, joints], max(limits.tolerance, TOLERANCE)
@@ -97,8 +97,7 @@ def closeness_by_interval(motion: Trajectory, limits: Limits) -> Array:
     found = np.full((motion.grid.intervals, *limits.lower.shape), np.inf)
     for each in limit_conditions(limits, motion.grid.order, motion.space):
         assert isinstance(each.on, LimitRange)
-        sides = excess_along(motion, each).sides
-        found[:, each.on.row, each.on.joints] = -sides.max(axis=0)
+        found[:, each.on.row, each.on.joints] = -excess_along(motion, each).max(axis=0)
     return found
 
 

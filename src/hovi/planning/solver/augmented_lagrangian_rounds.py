@@ -10,9 +10,10 @@ import numpy as np
 from hovi.discrete.grid import DiscretePath
 from hovi.optimize.ended import Ended, Reason
 from hovi.planning.conditions.condition import describe, is_spurious, whose
+from hovi.planning.problem.conditions_of import passive_joints
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.action_objective import ActionObjective
-from hovi.planning.solver.multipliers import Multipliers, Residuals, largest_residual
+from hovi.planning.solver.multipliers import Multipliers, Residuals
 
 INITIAL_TORQUE_PENALTY = 10.0
 """Initial penalty of passive torques, relative to the mean weight of the other joints."""
@@ -157,13 +158,9 @@ def unmet_sentence(problem: TrajectoryProblem, path: DiscretePath, residuals: Re
             f"remaining torque is {residuals.torque_fraction:.3g} of the largest; allow more time "
             "or change the goal"
         )
-    worst = largest_residual(problem, residuals.nodes)[0]
+    sizes = [float(np.max(np.abs(c), initial=0.0)) for c in residuals.nodes]
+    worst = problem.equations[int(np.argmax(sizes))]
     return (
         f"{whose(worst)} at t = {worst.where.time:.4g} s cannot be met: {describe(worst, path)}; "
         "change the goal, increase the duration or try another initial guess"
     )
-
-
-def passive_joints(problem: TrajectoryProblem) -> str:
-    """The names of the passive joints."""
-    return ", ".join(repr(joint) for joint in problem.scene.passive)

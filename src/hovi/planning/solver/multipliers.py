@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.discrete.grid import DiscretePath
-from hovi.planning.conditions.condition import Equation, residual
+from hovi.planning.conditions.condition import residual
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.scene.lagrangian import PointTerms
 from hovi.system.dataclass import dataclass
@@ -118,10 +118,3 @@ class Multipliers:
 def node_residuals(problem: TrajectoryProblem, x: DiscretePath) -> list[Array]:
     """c of every condition at a path."""
     return [residual(each, x) for each in problem.equations]
-
-
-def largest_residual(problem: TrajectoryProblem, nodes: list[Array]) -> tuple[Equation, float]:
-    """The equation with the largest residual, and its size in [rad] or [m]; nodes: of all."""
-    sizes = [float(np.max(np.abs(c), initial=0.0)) for c in nodes]
-    worst = max(range(len(sizes)), key=sizes.__getitem__)
-    return problem.equations[worst], sizes[worst]

@@ -40,7 +40,10 @@ def test_a_minimum_is_usable(found: hovi.Solution) -> None:
     [
         ({"goal": hovi.State([0.7, 1.0])}, "ends 0.1 rad from the position of 'elbow'"),
         ({"start": hovi.State(START, [0.5, 0.0])}, "starts 0.5 rad/s from the velocity"),
-        ({"goal": hovi.FrameGoal("tip", position=[0, 0, 0.5])}, "from the goal of its frame"),
+        (
+            {"goal": hovi.FrameGoal("tip", position=[0, 0, 0.5])},
+            "goal at t = 1 s is missed: frame",
+        ),
     ],
 )
 def test_ends_that_are_missed_are_named(

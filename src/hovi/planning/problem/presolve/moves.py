@@ -51,7 +51,7 @@ class Waypoint:
         q, _ = self.goal.on(on, self.name)
         return q, ~self.goal.free_on(on, self.name)[0]
 
-    def rests(self, on: Coordinates) -> Mask:
+    def at_rest(self, on: Coordinates) -> Mask:
         """At which joints the velocity is prescribed to be zero, (nv,)."""
         inner = self.name not in ("start", "goal")
         goal = self.goal
@@ -124,7 +124,7 @@ class Move:
     @property
     def rests(self) -> Rests:
         """Number of waypoints at which each joint rests, (nv,)."""
-        first, last = (waypoint.rests(self.coordinates) for waypoint in (self.first, self.last))
+        first, last = (waypoint.at_rest(self.coordinates) for waypoint in (self.first, self.last))
         return first.astype(np.intp) + last
 
     @property

@@ -58,7 +58,7 @@ class TimedSearch(BoundedSearch):
     price: of time.
     """
 
-    timed = True
+    free_duration = True
     price: TimePrice = dataclasses.field(kw_only=True)
 
     def solve(self, start: Begun) -> Bounded:

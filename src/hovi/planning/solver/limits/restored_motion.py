@@ -49,7 +49,7 @@ def locally_infeasible(search: BoundedSearch, ended: Bounded) -> str:
     These are looked for from the motion of a failed solve, from the guess and from a perturbed one.
     If all three find one, and two of them the lowest, that becomes the motion of the failed solve.
     """
-    if search.problem.constrained or search.clearance is not None or search.timed:
+    if search.problem.constrained or search.clearance is not None or search.free_duration:
         return ""
     rows, search.rows = search.rows, search.fine_rows()
     objective = search.objective(None)

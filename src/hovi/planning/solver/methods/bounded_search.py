@@ -86,13 +86,13 @@ class BoundedSearch:
     multipliers, unmet: of the constraints, and why they cannot be satisfied, or "".
     last: the problem and the motion of the last solve. solved: how it ended, and its objective.
     points: of the central path, with a larger barrier than that of the last solution. at_level:
-        whether a solve begins on one. timed: whether the duration is free.
+        whether a solve begins on one. free_duration: whether the duration is free.
     along, level: central path of a similar problem, if there is one on as many intervals, and the
         barrier parameter at which it is begun: see Start.
     locally_infeasible: see Answer.
     """
 
-    timed: ClassVar[bool] = False
+    free_duration: ClassVar[bool] = False
     problem: TrajectoryProblem
     limits: Limits
     criteria: Criteria

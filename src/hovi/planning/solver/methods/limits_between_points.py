@@ -92,7 +92,7 @@ def usable(ended: Bounded) -> bool:
 
 def _goes_on(search: BoundedSearch, ended: Bounded) -> bool:
     """Whether bounds may be tightened further; with a free duration, after a minimum alone."""
-    return usable(ended) and not (search.timed and ended.why is Reason.ITERATION_LIMIT)
+    return usable(ended) and not (search.free_duration and ended.why is Reason.ITERATION_LIMIT)
 
 
 def _solved_tighter(search: BoundedSearch, ended: Bounded, sides: Array) -> Bounded:
@@ -111,7 +111,7 @@ def _solved_tighter(search: BoundedSearch, ended: Bounded, sides: Array) -> Boun
     if len(y) == len(barrier.s):
         z = Barrier.central(objective.bounds, y, mu, None, WARM_START_MARGIN, barrier)
     whole = search.criteria
-    if search.timed:
+    if search.free_duration:
         most = min(TIMED_STEPS, whole.max_iterations)
         search.criteria = dataclasses.replace(whole, max_iterations=most)
     ended = search.solve(Start(ended.x, z))

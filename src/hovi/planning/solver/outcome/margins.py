@@ -56,7 +56,7 @@ def margins_of(problem: TrajectoryProblem, motion: Trajectory) -> Margins:
 def margins_to_bounds(problem: TrajectoryProblem, motion: Trajectory) -> dict[str, Any]:
     """The fields of Margins but for distances."""
     limits, segments = limit_margins(motion, problem.limits)
-    conditions = {each.name: -excess_along(motion, each).worst for each in problem.bounds}
+    conditions = {each.name: -float(excess_along(motion, each).max()) for each in problem.bounds}
     return {"limits": limits, "segments": segments, "conditions": conditions}
 
 

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
-
-import numpy as np
 
 from hovi.discrete.trajectory import Trajectory
 from hovi.planning.clearance.clearance_violation import (
@@ -13,7 +11,7 @@ from hovi.planning.clearance.clearance_violation import (
     approach_sentence,
     near_pairs,
 )
-from hovi.planning.conditions.condition import Condition, describe, residual, whose
+from hovi.planning.conditions.condition import Condition, missed, whose
 from hovi.planning.conditions.excess import excess_of, worst
 from hovi.planning.conditions.pair_distances import PairDistances
 from hovi.planning.conditions.places import Along, AtNode, AtPoints, ControlPoints, Exchange
@@ -21,7 +19,7 @@ from hovi.planning.problem.conditions_of import conditions_of
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.outcome.control_polygons import exceeds
-from hovi.planning.solver.outcome.ends import ends_missed
+from hovi.planning.solver.outcome.ends import turns_missed_by
 
 Violation = Callable[[Condition[Any, Any], Trajectory, TrajectoryProblem], str]
 """What a motion violates of a condition of a problem, as a clause; "" if it is satisfied."""
@@ -35,21 +33,23 @@ def violation_of(problem: TrajectoryProblem, motion: Trajectory) -> str:
     Between the nodes, too.
     Raises OutOfTimeError when the deadline in force passes before that is known.
     """
-    return ends_missed(problem, motion) or violation_between_ends(problem, motion)
+    violated = problem.unreachable or first_violated(conditions_of(problem), problem, motion)
+    return violated or turns_missed_by(problem, motion)
 
 
-def violation_between_ends(problem: TrajectoryProblem, motion: Trajectory) -> str:
-    """As `violation_of`, of a motion that has the ends of its problem."""
-    asked = conditions_of(problem)
+def first_violated(
+    asked: Iterable[Condition[Any, Any]], problem: TrajectoryProblem, motion: Trajectory
+) -> str:
+    """As `violation_of`, of some conditions of a problem."""
     found = (VIOLATIONS[type(each.where)](each, motion, problem) for each in asked)
     return next(filter(None, found), "")
 
 
 def _at_node(given: Condition[Any, Any], motion: Trajectory, problem: TrajectoryProblem) -> str:
-    if np.max(np.abs(residual(given, motion.path)), initial=0.0) <= given.tolerance:
-        return ""
-    missed = describe(given, motion.path)
-    return f"{whose(given)} at t = {given.where.time:.4g} s is missed: {missed}"
+    clause, where = missed(given, motion.path), given.where
+    if where.given:
+        return clause and f"the motion {clause}"
+    return clause and f"{whose(given)} at t = {where.time:.4g} s is missed: {clause}"
 
 
 def _at_all_times(

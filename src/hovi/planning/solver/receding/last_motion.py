@@ -9,10 +9,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from hovi.discrete.grid import DiscretePath
+from hovi.planning.problem.conditions_of import between_ends
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.answer import Answer
 from hovi.planning.solver.outcome.ends import misses
-from hovi.planning.solver.outcome.violation import violation_between_ends
+from hovi.planning.solver.outcome.violation import first_violated
 from hovi.planning.solver.status import Status
 
 if TYPE_CHECKING:
@@ -26,7 +27,7 @@ def satisfies(problem: TrajectoryProblem, path: DiscretePath) -> bool:
     Raises OutOfTimeError when the deadline in force passes before that is known.
     """
     motion = problem.trajectory(path)
-    return not violation_between_ends(problem, motion)
+    return not first_violated(between_ends(problem), problem, motion)
 
 
 def last_motion(
