@@ -7,16 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
+from hovi.planning.conditions.condition import TOLERANCE
 from hovi.planning.conditions.function import Function, Points, Slopes
 from hovi.planning.conditions.joint_quantity import DERIVATIVES, QUANTITIES
 from hovi.robot.space.coordinates import Coordinates
 from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
-
-
-SEEN = 1e-6
-"""Error from which it is named in a message, in [rad] or [m], per [s] for rates."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +58,7 @@ class StateDifference(Function):
             kind, joint = QUANTITIES[name], on.coordinate_names[i]
             if not self.verb and error[i] == errors.max():
                 return f"the {kind} of joint {joint!r} misses it by {error[i]:.3g}"
-            if error[i] > SEEN:
+            if error[i] > TOLERANCE:
                 unit = getattr(on.coordinate_units[i], name)
                 found.append(f"{error[i]:.3g} {unit} from the {kind} of {joint!r}")
         return f"{self.verb} {' and '.join(found)}"

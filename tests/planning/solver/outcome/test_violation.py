@@ -54,13 +54,16 @@ def test_ends_that_are_missed_are_named(
     assert clause in other.violation
 
 
-def test_a_limit_that_is_exceeded_is_named(found: hovi.Solution) -> None:
-    limits = hovi.as_limits(found.problem.robot, {"base": "none", "v": 1.0})  # type: ignore[union-attr]
+@pytest.mark.parametrize(
+    ("kind", "said"), [("v", "the velocity of joint '"), ("tau", "the torque of joint '")]
+)
+def test_a_limit_that_is_exceeded_is_named(found: hovi.Solution, kind: str, said: str) -> None:
+    limits = hovi.as_limits(found.problem.robot, {"base": "none", kind: 1.0})  # type: ignore[union-attr]
     other = of_problem(found, limits=limits)
     assert not other.usable
-    assert other.violation.startswith("the velocity of joint '")
+    assert other.violation.startswith(said)
     assert other.violation.endswith("its limit is 1")
-    loose = dataclasses.replace(limits, tolerance=2.0)
+    loose = dataclasses.replace(limits, tolerance=100.0)
     assert of_problem(found, limits=loose).usable
 
 
