@@ -148,7 +148,9 @@ def _narrow(motion: Trajectory, given: Condition[Between, Any]) -> NarrowCells:
 
 
 def _found_along(motion: Trajectory, given: Condition[TwoSided, Any]) -> Excess:
-    return _with_narrow(_excess_in(Cells.of(motion.grid.intervals, 1), motion, given), motion, given)
+    return _with_narrow(
+        _excess_in(Cells.of(motion.grid.intervals, 1), motion, given), motion, given
+    )
 
 
 def _with_narrow(found: Excess, motion: Trajectory, given: Condition[TwoSided, Any]) -> Excess:
