@@ -27,7 +27,7 @@ from hovi.planning.clearance.clearance_violation import (
 )
 from hovi.planning.conditions.excess import excess_of, worst
 from hovi.planning.conditions.places import AtPoints
-from hovi.planning.problem.limit_conditions import LimitRange, closeness, limit_conditions
+from hovi.planning.problem.limit_conditions import LimitRange, limit_conditions
 from hovi.planning.problem.limits import Limits
 from hovi.planning.problem.presolve.end_torques import static_sentence
 from hovi.planning.problem.problem import TrajectoryProblem
@@ -402,11 +402,11 @@ class BoundedSearch:
     def worst(self, path: DiscretePath) -> str:
         """The limit, distance or condition that is violated most: what, and when."""
         trajectory, more = self.problem.trajectory(path), self.more
-        if more is not None:
-            excess, clause = more.worst(trajectory, self.limits.tolerance)
-            if excess >= -closeness(trajectory, self.limits).min():
-                return clause
         order, on = trajectory.grid.order, self.problem.coordinates
-        every = limit_conditions(self.limits, order, trajectory.space, on)
-        sentence = max(worst(trajectory, each) for each in every)[1]
-        return sentence + static_sentence(self.problem, self.limits)
+        others = [] if more is None else [more.worst(trajectory, self.limits.tolerance)]
+        limits = limit_conditions(self.limits, order, trajectory.space, on)
+        found = [*others, *(worst(trajectory, each) for each in limits)]
+        i = int(np.argmax([excess for excess, _ in found]))  # what is no number comes first
+        return found[i][1] + (
+            static_sentence(self.problem, self.limits) if i >= len(others) else ""
+        )
