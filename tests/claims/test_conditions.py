@@ -14,6 +14,7 @@ import pytest
 
 import hovi
 from hovi.errors import InputError, SceneError
+from hovi.study.running.measures import row_of
 
 START, GOAL = np.array([0, -1.5, 1.5, 0, 0, 0.0]), np.array([1.0, -1.0, 1.0, 0.5, 0.5, 0.5])
 OPTIONS: dict[str, Any] = {"self_collision": False}
@@ -142,6 +143,87 @@ def test_a_sequence_keeps_the_power(scene: hovi.Scene) -> None:
     segments[0] = hovi.Segment(GOAL, 1.5, limits={"power": 28.0})
     with pytest.raises(InputError, match="limits on the power must be the same in all segments"):
         hovi.plan_sequence(scene, START, segments, **OPTIONS)
+
+
+@pytest.mark.parametrize("segments", [1, 2])
+def test_limits_of_one_segment_leave_the_power_of_the_whole(
+    scene: hovi.Scene, ur5: hovi.Robot, segments: int
+) -> None:
+    own = {"base": "none", "v": 1.1}
+    given = [hovi.Segment(GOAL, 1.5, limits=own), hovi.Segment(START, 1.5)][:segments]
+    found = hovi.plan_sequence(scene, START, given, limits={"power": 28.0}, **OPTIONS)
+    assert found.success, found.message
+    assert np.abs(powers(found.trajectory, ur5)).max() <= 28.0 + 2e-6 * 56.0
+    first, later = (np.linspace(a, a + 1.5, 1001) for a in (0.0, 1.5))
+    assert np.abs(found.trajectory.sample(first).v).max() <= 1.1 + 1e-5
+    assert segments == 1 or np.abs(found.trajectory.sample(later).v).max() > 1.2
+
+
+@pytest.mark.filterwarnings("ignore:Self-collision was left out")
+@pytest.mark.parametrize(
+    "limits",
+    [
+        {"power": 28.0},
+        {"base": "none", "power": 28.0},
+        {"power": {"elbow_joint": [-np.inf, 20.0]}},
+        {"power": 28.0, "margin": 0.1, "tolerance": 1e-4},
+    ],
+    ids=["with others", "alone", "of one side", "with a margin"],
+)
+def test_a_saved_motion_keeps_its_limit_on_the_power(
+    scene: hovi.Scene, ur5: hovi.Robot, tmp_path: Path, limits: dict[str, Any]
+) -> None:
+    found = hovi.plan(scene, START, GOAL, 1.5, limits=limits, **OPTIONS)
+    assert found.success, found.message
+    found.trajectory.save(tmp_path / "motion.npz")
+    motion = hovi.Trajectory.load(tmp_path / "motion.npz")
+    saved = motion.metadata["limits"]
+    asked = hovi.as_limits(ur5, limits).conditions[0]
+    again = hovi.Limits.from_dict(saved, ur5).conditions[0]
+    assert (again.name, again.of, again.tolerance) == ("power", asked.of, asked.tolerance)
+    for side in ("lower", "upper"):
+        np.testing.assert_array_equal(getattr(again.on, side), getattr(asked.on, side))
+    with pytest.raises(InputError, match="limits on the power need the robot: give it as `on`"):
+        hovi.Limits.from_dict(saved)
+    hovi.write_report(motion, tmp_path / "report.html")
+    report = (tmp_path / "report.html").read_text()
+    assert "margin to the limits on power</td>" in report
+    assert "none were imposed" not in report
+
+
+def test_limits_on_the_power_need_a_robot_with_inertia(tmp_path: Path) -> None:
+    urdf = """<robot name="massless"><link name="base"/><link name="arm"/>
+    <joint name="hinge" type="revolute"><parent link="base"/><child link="arm"/><axis xyz="0 0 1"/>
+    <limit lower="-2" upper="2" velocity="3" effort="50"/></joint></robot>"""
+    (tmp_path / "massless.urdf").write_text(urdf)
+    scene = hovi.Scene(hovi.load_robot(tmp_path / "massless.urdf"))
+    with pytest.raises(InputError, match="limits on the power need torques, and joints of this"):
+        hovi.plan(scene, [0.0], [1.0], 1.0, limits={"power": 5.0}, objective="jerk")
+
+
+def test_limits_have_conditions_of_their_own_keys_alone(ur5: hovi.Robot) -> None:
+    """A bound that changes with time was saved as that at its start, and had a free duration."""
+    limits = hovi.as_limits(ur5, {"power": 20.0})
+    known = limits.conditions[0]
+    varying = dataclasses.replace(known, on=hovi.Between(-9.0, lambda t: 28.0 - t), scale=9.0)
+    for each in (varying, dataclasses.replace(known, name="other")):
+        with pytest.raises(InputError, match="limits have conditions on the power alone"):
+            dataclasses.replace(limits, conditions=(each,))
+    upper = limits.with_margin(0.1).conditions[0].on.upper
+    np.testing.assert_allclose(np.asarray(upper), 16.0)
+
+
+def test_the_margin_of_a_study_and_the_bound_of_a_certificate_know_the_power(
+    free: hovi.Solution, ur5: hovi.Robot
+) -> None:
+    known = hovi.as_limits(ur5, {"base": "none", "power": 28.0})
+    problem = dataclasses.replace(free.problem, limits=known)  # type: ignore[type-var]
+    judged = dataclasses.replace(free, problem=problem)
+    most = np.abs(powers(free.trajectory, ur5)).max()
+    row = row_of(judged, "", 1.0, None)
+    assert row.margin == pytest.approx((28.0 - most) / 56.0, rel=1e-3)
+    sentence = hovi.certify(judged, estimate=False).missing["bound"]
+    assert "the curve exceeds condition 'power' by 3" in sentence
 
 
 @pytest.mark.parametrize("own", [{}, {"jerk": 500.0}], ids=["alike", "one with a jerk"])

@@ -21,25 +21,33 @@ _OBSTACLE_COLOR = np.array([0.75, 0.32, 0.22, 1.0])  # brick: stands out from ro
 
 
 def imposed_limits(trajectory: Trajectory) -> Limits | None:
-    """The limits recorded in a motion's metadata; None where there are none.
+    """The limits on joints recorded in a motion's metadata; None where there are none.
 
     Of a motion in segments, each with its own, the loosest, within which it is as a whole.
+    """
+    limits = recorded_limits(trajectory)
+    return limits if limits is not None and limits.bounded.any() else None
+
+
+def recorded_limits(trajectory: Trajectory) -> Limits | None:
+    """The same with the limits on the power, which may be alone.
+
     Metadata may come from a file: invalid limits, or limits of another robot, count as none.
     """
     data = trajectory.metadata.get("limits")
     of_segments = trajectory.metadata.get("segment_limits")
     try:
         if isinstance(data, dict):
-            limits = Limits.from_dict(data)
+            limits = Limits.from_dict(data, trajectory.robot)
         elif isinstance(of_segments, list) and of_segments:
-            limits = _loosest([Limits.from_dict(each) for each in of_segments])
+            limits = _loosest([Limits.from_dict(each, trajectory.robot) for each in of_segments])
         else:
             return None
     except (InputError, KeyError, TypeError, ValueError):
         return None
     fits = limits.lower.shape[1] == trajectory.v.shape[1]
     fits = fits and not (limits.on_rates and trajectory.grid.order < 3)
-    return limits if fits and limits.bounded.any() else None
+    return limits if fits and (limits.bounded.any() or limits.conditions) else None
 
 
 def _loosest(parts: list[Limits]) -> Limits:
@@ -48,7 +56,8 @@ def _loosest(parts: list[Limits]) -> Limits:
     lower = np.min([each.lower for each in parts], axis=0)
     upper = np.max([each.upper for each in parts], axis=0)
     excused = tuple(each for part in parts for each in part.excused)
-    return Limits(lower, upper, max(each.tolerance for each in parts), excused=excused)
+    tolerance, power = max(each.tolerance for each in parts), parts[0].conditions
+    return Limits(lower, upper, tolerance, excused=excused, conditions=power)
 
 
 def led_back_sentence(trajectory: Trajectory) -> str:

@@ -14,9 +14,10 @@ from hovi.checks.arguments import check_arguments, check_arguments_except
 from hovi.checks.kinds import shown
 from hovi.checks.shapes import require_shape
 from hovi.errors import InputError, nearest, warn
-from hovi.planning.conditions.condition import Inequality, with_function
+from hovi.planning.conditions.condition import Inequality, scales, with_function
 from hovi.planning.conditions.joint_quantity import QUANTITIES
 from hovi.planning.conditions.named import NAMED
+from hovi.planning.conditions.sets import Between
 from hovi.planning.problem.arms.limit_set import NAMES as ARMS
 from hovi.planning.problem.arms.limit_set import OF_ORDER_3, is_limit_set, limit_set
 from hovi.planning.problem.arms.urdf_ranges import position_ranges, require_ranges
@@ -87,6 +88,12 @@ class Limits(LimitsSummary):
             )
         if not (np.isfinite(self.tolerance) and self.tolerance > 0):
             raise InputError(f"the tolerance of limits must be positive, got {self.tolerance}.")
+        for each in self.conditions:
+            if each.name not in NAMED or each.on.varies or len(each.of) != each.y.size:
+                raise InputError(
+                    f"limits have conditions on the {' and '.join(NAMED)} alone, which `as_limits` "
+                    f"makes: give condition {each.name!r} by `conditions`."
+                )
 
     @classmethod
     def of_segments(cls, parts: Sequence[Limits], ends: Sequence[float]) -> Limits:
@@ -161,6 +168,12 @@ class Limits(LimitsSummary):
     def until(self, time: float) -> Limits:
         """The limits just before a time, in [s]: those of its segment, or these."""
         return self.parts[int(np.searchsorted(np.array(self.ends), time))] if self.parts else self
+
+    def with_conditions_of(self, whole: Limits) -> Limits:
+        """The same, and conditions of other limits on what these do not name."""
+        own = {each.name for each in self.conditions}
+        more = tuple(each for each in whole.conditions if each.name not in own)
+        return dataclasses.replace(self, conditions=(*self.conditions, *more)) if more else self
 
     @property
     def _named_bounds(self) -> list[tuple[object, ...]]:
@@ -241,19 +254,40 @@ class Limits(LimitsSummary):
             for name, bound in (("lower", self.lower), ("upper", self.upper))
         }
         excused = [each.to_dict() for each in self.excused]
-        return {**rows, "tolerance": self.tolerance, **({"excused": excused} if excused else {})}
+        conditions = {
+            each.name: {
+                joint: [x if np.isfinite(x) else None for x in pair]
+                for joint, pair in pairs_of(each).items()
+            }
+            for each in self.conditions
+        }
+        more = {"excused": excused, "conditions": conditions}
+        known = {key: value for key, value in more.items() if value}
+        return {**rows, "tolerance": self.tolerance, **known}
 
     @classmethod
-    def from_dict(cls, data: Mapping[str, Any]) -> Limits:
-        """The inverse of to_dict. Raises InputError for other data."""
+    def from_dict(cls, data: Mapping[str, Any], on: Coordinates | None = None) -> Limits:
+        """The inverse of to_dict. Raises InputError for other data.
+
+        on: the robot, which limits on the power need.
+        """
         try:
             lower, upper = (
                 np.array([[free if x is None else x for x in row] for row in data[name]], float)
                 for name, free in (("lower", -np.inf), ("upper", np.inf))
             )
             known = tuple(Excused.from_dict(x, lower.shape[1]) for x in data.get("excused", ()))
-            return cls(lower, upper, float(data["tolerance"]), excused=known)
-        except (KeyError, TypeError, ValueError, OverflowError, IndexError) as error:
+            tolerance = float(data["tolerance"])
+            named = _named_from(data.get("conditions", {}), tolerance, on)
+            return cls(lower, upper, tolerance, excused=known, conditions=named)
+        except (
+            AttributeError,
+            KeyError,
+            TypeError,
+            ValueError,
+            OverflowError,
+            IndexError,
+        ) as error:
             raise InputError(
                 f"expected the limits that `to_dict` returns, got data with {error!r}."
             ) from error
@@ -287,7 +321,9 @@ class Limits(LimitsSummary):
         shift = margin * self.ranges
         if self.parts:
             return Limits.of_segments([p.with_margin(margin) for p in self.parts], self.ends)
-        return self._between(self.lower + shift, self.upper - shift)
+        inside = tuple(_tightened(each, margin) for each in self.conditions)
+        tightened = self._between(self.lower + shift, self.upper - shift)
+        return dataclasses.replace(tightened, conditions=inside)
 
 
 def limited_columns(order: int, nv: int) -> npt.NDArray[np.intp]:
@@ -362,25 +398,59 @@ def as_limits(
             lower[row, i], upper[row, i] = pair
     lower[lower < -UNBOUNDED], upper[upper > UNBOUNDED] = -np.inf, np.inf
     margin, tolerance = number_in(limits, "margin", 0.0), number_in(limits, "tolerance", TOLERANCE)
-    chosen = Limits(lower, upper, tolerance).with_margin(margin)
-    named = _named_conditions(coordinates, limits, margin, tolerance)
-    return _warned_of_degrees(coordinates, dataclasses.replace(chosen, conditions=named))
+    named = {kind: entries(coordinates, kind, limits.get(kind, {})) for kind in NAMED}
+    conditions = named_conditions(coordinates, named, tolerance)
+    chosen = Limits(lower, upper, tolerance, conditions=conditions).with_margin(margin)
+    return _warned_of_degrees(coordinates, chosen)
 
 
-def _named_conditions(
-    coordinates: Coordinates, limits: Mapping[str, Any], margin: float, tolerance: float
+def named_conditions(
+    coordinates: Coordinates, given: Mapping[str, dict[int, tuple[float, float]]], tolerance: float
 ) -> tuple[Inequality, ...]:
-    """The conditions that have a key in a mapping. Raises InputError as `entries`."""
+    """The conditions on NAMED quantities. given: bounds by index in v. tolerance: at least 1e-6."""
     found = []
-    for name, make in NAMED.items():
-        given = entries(coordinates, name, limits.get(name, {}))
-        if given:
-            kept = {i: margin * (high - low) for i, (low, high) in given.items()}
-            inside = {i: (low + kept[i], high - kept[i]) for i, (low, high) in given.items()}
-            made, least = make(coordinates, inside), max(tolerance, TOLERANCE)
+    for name, bounds in given.items():
+        if bounds:
+            made, least = NAMED[name](coordinates, bounds), max(tolerance, TOLERANCE)
             condition = dataclasses.replace(made, tolerance=least)
             found.append(cast(Inequality, with_function(condition, coordinates)))
     return tuple(found)
+
+
+def pairs_of(given: Inequality) -> dict[str, tuple[float, float]]:
+    """The bounds of a condition that limits have, by joint."""
+    lower, upper = (side[0].tolist() for side in given.on.at(np.zeros(1), len(given.of)))
+    return dict(zip(given.of, zip(lower, upper, strict=True), strict=True))
+
+
+def _named_from(data: Any, tolerance: float, on: Coordinates | None) -> tuple[Inequality, ...]:
+    """The conditions of `Limits.to_dict`. Raises InputError, or as Limits.from_dict does."""
+    if not data:
+        return ()
+    if on is None:
+        raise InputError(f"limits on the {' and '.join(data)} need the robot: give it as `on`.")
+    free = -np.inf, np.inf
+    given = {
+        name: {
+            on.coordinate_names.index(joint): (
+                free[0] if pair[0] is None else float(pair[0]),
+                free[1] if pair[1] is None else float(pair[1]),
+            )
+            for joint, pair in bounds.items()
+        }
+        for name, bounds in data.items()
+    }
+    in_order = {name: dict(sorted(bounds.items())) for name, bounds in given.items()}
+    return named_conditions(on, in_order, tolerance)
+
+
+def _tightened(given: Inequality, margin: float) -> Inequality:
+    """A condition between bounds that are tightened by a fraction of its scales."""
+    if margin == 0:
+        return given
+    low, high = (side[0] for side in given.on.at(np.zeros(1), given.y.size))
+    shift = margin * scales(given)
+    return dataclasses.replace(given, on=Between(low + shift, high - shift))
 
 
 def _warned_of_degrees(coordinates: Coordinates, limits: Limits) -> Limits:

@@ -15,6 +15,7 @@ from hovi.discrete.measures.motion_error import MotionError, relative_difference
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError, expect
 from hovi.flows.execution.dynamics_replay import DynamicsReplay, replay_dynamics
+from hovi.planning.conditions.excess import excess_of
 from hovi.planning.problem.limit_conditions import closeness
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.refinement.error_estimate import estimate_error
@@ -158,6 +159,12 @@ def _upper_bound(solution: Solution, problem: TrajectoryProblem, integral: Curve
         excess = -float(closeness(solution.trajectory, problem.limits).min())
         if excess > problem.limits.tolerance:
             raise InputError(f"the curve exceeds a limit by {excess:.1e} of its range")
+    for each in problem.bounds:
+        excess = float(excess_of(solution.trajectory, each).max())
+        if excess > each.tolerance:
+            raise InputError(
+                f"the curve exceeds condition {each.name!r} by {excess:.1e} of its scale"
+            )
     return integral.upper_bound
 
 

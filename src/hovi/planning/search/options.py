@@ -363,8 +363,15 @@ class PlanOptions:
         """
         order = 3 if self.smooth or self.objective == "jerk" else scene.order
         limits = as_limits(scene.robot, given, order)
-        without = limits.on_torques and without_inertia(scene)
-        return limits.without_torques if without else limits
+        massless = without_inertia(scene) if limits.on_torques or limits.conditions else ""
+        for each in limits.conditions:
+            if massless and "tau" in each.y.needs:
+                raise InputError(
+                    f"limits on the {each.name} need torques, and joints of this robot have no "
+                    f"inertia ({massless}): leave `{each.name}` out of the limits, or give the "
+                    "links their masses."
+                )
+        return limits.without_torques if massless else limits
 
 
 def _withdrawn(changes: Mapping[str, Any]) -> dict[str, Any]:

@@ -78,11 +78,14 @@ def job_of(
 def limits_of(
     scene: Scene, segments: Sequence[Segment], options: PlanOptions
 ) -> tuple[Limits, ...]:
-    """The limits of every segment. Raises InputError for the torque rate, which jumps."""
-    found = []
+    """The limits of every segment. Raises InputError for the torque rate, which jumps.
+
+    Those on the power of the whole hold in segments with limits of their own, too.
+    """
+    found, whole = list[Limits](), options.limits_on(scene, options.limits)
     for name, each in zip(names_of(segments), segments, strict=True):
         given = options.limits if each.limits is None else each.limits
-        found.append(options.limits_on(scene, given))
+        found.append(options.limits_on(scene, given).with_conditions_of(whole))
         if found[-1].on_torque_rate:
             raise InputError(
                 f"{name!r} has limits on the torque rate, but torques jump where the segments of a "

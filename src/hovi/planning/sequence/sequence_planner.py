@@ -147,7 +147,9 @@ def _alone(
     """The motion of a single segment."""
     acting = Acting(tuple(segment.effects)).on(scene)
     if segment.limits is not None:
-        options = options.with_changes(limits=segment.limits)
+        whole = options.limits_on(acting, options.limits)
+        own = options.limits_on(acting, segment.limits)
+        options = options.with_changes(limits=own.with_conditions_of(whole))
     assert segment.goal is not None
     return plan(acting, start, segment.goal, segment.duration, progress, options)
 

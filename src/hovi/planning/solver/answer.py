@@ -96,6 +96,8 @@ class Answer:
                 metadata["segment_limits"] = [each.to_dict() for each in parts]
             else:
                 metadata["limits"] = problem.limits.to_dict()
+        if problem.conditions:
+            metadata["conditions"] = [each.name for each in problem.conditions]
         if problem.clearance is not None and problem.clearance.wanted:
             metadata["clearance"] = problem.clearance.to_dict()
         ld = at_instants(problem, self.instants).ld

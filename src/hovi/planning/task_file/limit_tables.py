@@ -10,7 +10,7 @@ from pydantic import ValidationError
 
 from hovi.errors import InputError, nearest
 from hovi.planning.conditions.named import NAMED
-from hovi.planning.problem.limits import KINDS, NAMES, Limits, as_limits
+from hovi.planning.problem.limits import KINDS, NAMES, Limits, as_limits, pairs_of
 from hovi.planning.task_file.effect_tables import plain
 from hovi.planning.task_file.messages import Keys, TomlText, first_sentence, in_toml, spelled
 from hovi.planning.task_file.schema import LimitsTable
@@ -55,10 +55,7 @@ def limits_value(limits: str | Limits | Mapping[str, Any], robot: Robot) -> str 
         }
         table |= {kind: pairs} if pairs else {}
     for each in limits.conditions:
-        lower, upper = (side[0].tolist() for side in each.on.at(np.zeros(1), len(each.of)))
-        table[each.name] = dict(
-            zip(each.of, map(list, zip(lower, upper, strict=True)), strict=True)
-        )
+        table[each.name] = {joint: list(pair) for joint, pair in pairs_of(each).items()}
     return table
 
 

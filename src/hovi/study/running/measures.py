@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from hovi.discrete.output.caution import caution_lines
 from hovi.discrete.trajectory import Trajectory
+from hovi.planning.conditions.excess import excess_along
 from hovi.planning.problem.limit_conditions import closeness
 from hovi.planning.solver.outcome.margins import margins_to_obstacles
 from hovi.planning.solver.solver import Solution
@@ -71,10 +72,13 @@ def _peaks(motion: Trajectory) -> dict[str, list[float] | None]:
 
 
 def _margin(solution: Solution) -> float | None:
+    """To the limits, those on the power included."""
     limits = None if solution.problem is None else solution.problem.limits
-    if limits is None or not limits.bounded.any():
+    if limits is None:
         return None
-    return _finite(closeness(solution.trajectory, limits).min())
+    motion = solution.trajectory
+    of_power = [-float(excess_along(motion, each).max()) for each in limits.conditions]
+    return _finite(min([float(closeness(motion, limits).min()), *of_power]))
 
 
 def _least_distance(solution: Solution) -> float | None:

@@ -25,6 +25,7 @@ from hovi.discrete.trajectory import Trajectory
 from hovi.errors import DisplayError, HoviError
 from hovi.flows.execution.dynamics_replay import DynamicsReplay, replay_dynamics
 from hovi.planning.clearance.clearance_violation import closest_along
+from hovi.planning.conditions.excess import excess_along
 from hovi.planning.problem.limit_conditions import closeness
 from hovi.planning.problem.limits import KINDS
 from hovi.scene.scene import Scene
@@ -33,7 +34,7 @@ from hovi.system.files import reason, whole_file
 from hovi.version import __version__
 from hovi.viewing.curves.given_motion import motion_in
 from hovi.viewing.plotting import motion_figure
-from hovi.viewing.recorded_limits import imposed_limits, kept_distances, led_back_sentence
+from hovi.viewing.recorded_limits import kept_distances, led_back_sentence, recorded_limits
 from hovi.viewing.replay_session import page_of
 
 if TYPE_CHECKING:
@@ -155,10 +156,19 @@ def _replayed(trajectory: Trajectory) -> str:
 
 
 def _margins(trajectory: Trajectory) -> Iterator[Row]:
-    limits, kept = imposed_limits(trajectory), kept_distances(trajectory)
+    limits, kept = recorded_limits(trajectory), kept_distances(trajectory)
+    names = trajectory.metadata.get("conditions")
+    if isinstance(names, list) and names:
+        known = ", ".join(str(each) for each in names)
+        yield "conditions", f"{known}: a saved motion knows their names, and not their bounds"
     if limits is None:
         yield "limits", "none were imposed"
     else:
+        for each in limits.conditions:
+            sides = excess_along(trajectory, each)
+            joint = int(np.argmax(sides.max(axis=(0, 1))))
+            percent = f"{-100 * float(sides.max()):.2g} % of the range"
+            yield f"margin to the limits on {each.name}", f"{percent}, at {each.of[joint]}"
         if limits.excused:
             yield "start", led_back_sentence(trajectory)
         margin = closeness(trajectory, limits)
