@@ -29,7 +29,7 @@ NEGLIGIBLE = 1e-7
 
 
 @dataclass(frozen=True, eq=False)
-class Bounds:
+class Enclosed:
     """A function over P boxes.
 
     lower, upper: shape (P, m). calm: whether every function in it has an argument that changes
@@ -42,10 +42,10 @@ class Bounds:
     calm: Mask
     jumps: Mask
 
-    def chosen(self, which: Mask) -> Bounds:
+    def chosen(self, which: Mask) -> Enclosed:
         """Those over some of the boxes."""
         at = self.lower[which], self.upper[which]
-        return Bounds(*at, self.calm[which], self.jumps[which])
+        return Enclosed(*at, self.calm[which], self.jumps[which])
 
     @property
     def width(self) -> Array:
@@ -73,7 +73,9 @@ class Enclosure:
         self.known = operations <= PLAIN | RULES.keys()
         self.bends = bool(operations - ARITHMETIC)
 
-    def __call__(self, boxes: Sequence[Bound], change: float, peaks: Array | None = None) -> Bounds:
+    def __call__(
+        self, boxes: Sequence[Bound], change: float, peaks: Array | None = None
+    ) -> Enclosed:
         """The bounds over P boxes.
 
         boxes: lower and upper bounds of each argument, (P, width) each.
@@ -108,7 +110,7 @@ class Enclosure:
         whole = np.concatenate(results, axis=2)
         lower = np.where(np.isnan(whole[0]), -np.inf, whole[0])
         upper = np.where(np.isnan(whole[1]), np.inf, whole[1])
-        return Bounds(lower, upper, run.calm, run.jumps)
+        return Enclosed(lower, upper, run.calm, run.jumps)
 
     @property
     def size(self) -> int:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import casadi as ca
 import numpy as np
 
-from hovi.effects.expressions.enclosure import Bounds, Enclosure
+from hovi.effects.expressions.enclosure import Enclosed, Enclosure
 from hovi.effects.expressions.interval_rules import Array, Mask
 from hovi.system.dataclass import dataclass
 
@@ -45,7 +45,7 @@ class TimePart:
         return np.where(bounds.calm, 0.0, away), size
 
 
-def from_line(bounds: Bounds, rates: Bounds, steps: Array) -> Array:
+def from_line(bounds: Enclosed, rates: Enclosed, steps: Array) -> Array:
     """How far a function may be from the line between its ends within boxes, shape (P, m).
 
     h (max f' - min f') / 4 where it is continuous, and max f - min f. rates: bounds of f' along the

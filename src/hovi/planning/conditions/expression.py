@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from hovi.discrete.cells import CHANGE
 from hovi.dynamics.point_function import PointFunction
-from hovi.effects.expressions.enclosure import Bounds, Enclosure
+from hovi.effects.expressions.enclosure import Enclosed, Enclosure
 from hovi.effects.expressions.interval_rules import Bound
 from hovi.errors import InputError, nearest, reason
 from hovi.planning.conditions.function import ARGUMENTS, Curvature, Function, Points, Slopes
@@ -63,7 +63,7 @@ class Expression(Function):
         """y, shape (P, size)."""
         return self._values(*self._arguments(at))[0].reshape(len(at.q), self.size)
 
-    def enclosure(self, box: Mapping[str, Bound]) -> Bounds | None:
+    def enclosure(self, box: Mapping[str, Bound]) -> Enclosed | None:
         """Bounds of y over boxes of its arguments, by their names; None if it has none."""
         if not self._enclosure.known:
             return None

@@ -19,7 +19,7 @@ from hovi.planning.clearance.self_collisions import can_keep_apart
 from hovi.planning.obstacles.obstacle import Obstacle
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.kinematics.branches import Branches, find_branches
-from hovi.planning.problem.limits import Limits, as_limits
+from hovi.planning.problem.limits import Limits, Range, as_limits
 from hovi.planning.problem.notation.ends import end_of
 from hovi.planning.problem.presolve.frame_hints import hint_on_frame
 from hovi.robot.robot import Robot
@@ -28,7 +28,6 @@ from hovi.robot.tip_frame import moves_frame
 from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
-Bounds = tuple[Array, Array]
 
 MOST = 16
 """Default number of configurations: a six-axis arm has no more."""
@@ -103,7 +102,7 @@ def configurations(
     robot: Robot,
     goal: FrameGoal,
     near: Array,
-    bounds: Bounds,
+    bounds: Range,
     clearance: Clearance,
     most: int = MOST,
     seeds: int = SEEDS,
@@ -123,7 +122,7 @@ def configurations(
 
 
 def nearest_configuration(
-    robot: Robot, goal: FrameGoal, near: Array, bounds: Bounds
+    robot: Robot, goal: FrameGoal, near: Array, bounds: Range
 ) -> InverseKinematicsResult:
     """The nearest of the configurations found that reach a goal, or the best one if none does.
 
@@ -141,7 +140,7 @@ def by_distance(robot: Robot, q: Array, near: Array) -> Array:
     return np.asarray(q[order])
 
 
-def position_bounds(robot: Robot, limits: str | Limits | Mapping[str, Any]) -> Bounds:
+def position_bounds(robot: Robot, limits: str | Limits | Mapping[str, Any]) -> Range:
     """Lower and upper limits on q, shape (nv,). Raises InputError."""
     chosen = _named(robot, limits) if isinstance(limits, str) else as_limits(robot, limits)
     return chosen.lower[0], chosen.upper[0]
@@ -156,7 +155,7 @@ def first_configuration(
     robot: Robot,
     goal: FrameGoal,
     near: npt.ArrayLike | str | Mapping[str, Any] | None,
-    bounds: Bounds,
+    bounds: Range,
 ) -> Array:
     """Where the search begins, shape (nq,). Raises InputError."""
     if near is not None:

@@ -18,8 +18,9 @@ from hovi.discrete.state import State
 from hovi.errors import UnreachableError
 from hovi.planning.clearance.clearance import Clearance
 from hovi.planning.problem.frame_goal import FrameGoal
-from hovi.planning.problem.inverse_kinematics import Bounds, configurations, first_configuration
+from hovi.planning.problem.inverse_kinematics import configurations, first_configuration
 from hovi.planning.problem.kinematics.cubic_costs import cubic_costs
+from hovi.planning.problem.limits import Range
 from hovi.robot.robot import Robot
 from hovi.scene.lagrangian import Lagrangian
 from hovi.system.dataclass import dataclass
@@ -44,7 +45,7 @@ class MoveToGoal:
     begin: float
     end: float
     goal: End
-    bounds: Bounds
+    bounds: Range
 
 
 @dataclass(frozen=True, eq=False)

@@ -69,7 +69,7 @@ Bound = Annotated[
     Annotated[float, Tag("<number>")] | Annotated[list[float], Tag("<list>")] | Fraction,
     Discriminator(_kind_or_text),
 ]
-Bounds = Annotated[
+JointBounds = Annotated[
     Annotated[float, Tag("<number>")]
     | Annotated[list[Bound], Tag("<list>")]
     | Annotated[dict[str, Bound], Tag("<table>")]
@@ -231,11 +231,11 @@ class LimitsTable(Table):
         default="urdf", description='"urdf", "soft", "none" or the name of an arm, such as "panda"'
     )
     q: PositionBounds | None = Field(default=None, description=_POSITION_BOUNDS)
-    v: Bounds | None = Field(default=None, description=_BOUNDS)
-    a: Bounds | None = Field(default=None, description=_BOUNDS)
-    tau: Bounds | None = Field(default=None, description=_BOUNDS)
-    jerk: Bounds | None = Field(default=None, description=_BOUNDS)
-    torque_rate: Bounds | None = Field(default=None, description=_BOUNDS)
+    v: JointBounds | None = Field(default=None, description=_BOUNDS)
+    a: JointBounds | None = Field(default=None, description=_BOUNDS)
+    tau: JointBounds | None = Field(default=None, description=_BOUNDS)
+    jerk: JointBounds | None = Field(default=None, description=_BOUNDS)
+    torque_rate: JointBounds | None = Field(default=None, description=_BOUNDS)
     power: PositionBounds | None = Field(default=None, description=_POSITION_BOUNDS)
     margin: FiniteFloat = Field(
         default=0.0, ge=0, lt=0.5, description="a fraction of the range, from 0 to below 0.5"
