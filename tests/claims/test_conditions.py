@@ -472,6 +472,17 @@ def broken(function: Any, on: Any = None, **more: Any) -> Callable[[], hovi.Cond
     return lambda: hovi.Condition(function, on or hovi.Between(-1, 1), name="odd", **more)
 
 
+def own(
+    values: Callable[[hovi.Points], Any],
+    slopes: Callable[[hovi.Points], Any] = lambda at: {"q": np.zeros((len(at.q), 1, 6))},
+    needs: frozenset[str] = frozenset({"q"}),
+) -> Callable[[], hovi.Condition]:
+    """A condition of a function without CasADi."""
+    parts: dict[str, Any] = {"needs": needs, "size": 1}
+    parts |= {"values": lambda self, at: values(at), "slopes": lambda self, at: slopes(at)}
+    return broken(type("Own", (hovi.Function,), parts)())
+
+
 REFUSED: dict[str, tuple[Callable[[], Any], str]] = {
     "constant": (broken(lambda q: 3.0), "depends on none of q, v, a and tau"),
     "time alone": (broken(lambda t: t), "depends on none of q, v, a and tau"),
@@ -524,6 +535,23 @@ REFUSED: dict[str, tuple[Callable[[], Any], str]] = {
     "failing later": (
         broken("q", hovi.Between(-9, lambda t: 1.0 if t < 1 else 1 / 0), scale=1.0),
         "the upper bound at t = 1 s of a Between failed: division by zero",
+    ),
+    "values of a function": (
+        own(lambda at: at.q[:, 0]),
+        "the values of its function must have shape (2, 1) at two instants, got (2,)",
+    ),
+    "slopes of a function": (
+        own(lambda at: at.q[:, :1], lambda at: {"q": np.zeros((len(at.q), 6))}),
+        "the slopes in q of its function must have shape (2, 1, 6) at two instants, got (2, 6)",
+    ),
+    "no slopes of a function": (
+        own(lambda at: at.q[:, :1], lambda at: {}),
+        "the slopes in q of its function must have shape (2, 1, 6) at two instants, got none",
+    ),
+    "failing function": (own(lambda at: at.q[:, 9:10] / at.w), "its function failed: "),
+    "needs of a function": (
+        own(lambda at: at.q[:, :1], needs=frozenset({"w"})),
+        "its function needs some of q, v, a, tau and t, got ['w']",
     ),
     "failing bound": (
         broken("q", hovi.Between(-9, lambda t: 1 / (t - t)), scale=1.0),

@@ -145,8 +145,10 @@ def function_of(given: FunctionLike, name: str, coordinates: Coordinates) -> Fun
     name: of the condition, in messages. Raises InputError or SceneError for formulas and functions
     that are none of q, v, a, tau and t, that do not depend on the motion, or without values.
     """
-    if isinstance(given, Function):
+    if isinstance(given, Expression):
         return given
+    if isinstance(given, Function):
+        return _tried(given, f"condition {name!r}", coordinates)
     n = coordinates.nv
     sizes = {"q": coordinates.nq, "v": n, "a": n, "tau": n, "t": 1}
     symbols = {x: ca.SX.sym(x, size) for x, size in sizes.items()}
@@ -170,6 +172,31 @@ def function_of(given: FunctionLike, name: str, coordinates: Coordinates) -> Fun
             "it: leave the condition out, or name one of them."
         )
     return found
+
+
+def _tried(y: Function, what: str, on: Coordinates) -> Function:
+    """A function, after its values and slopes at two instants at rest have the shapes they need."""
+    n, q = on.nv, np.stack([on.neutral() if isinstance(on, Robot) else np.zeros(on.nq)] * 2)
+    rest = [np.zeros((2, n)) for _ in range(3)]
+    at = Points(q, rest[0], np.zeros(2), rest[1], rest[2])
+    try:
+        needs, size = frozenset(y.needs), y.size
+        found = {"values": np.shape(y.values(at))}
+        found |= {f"slopes in {x}": np.shape(J) for x, J in y.slopes(at).items()}
+    except Exception as error:  # a user's own function may raise anything
+        raise InputError(f"{what}: its function failed: {reason(error)}.") from error
+    if not needs or needs - set(ARGUMENTS):
+        raise InputError(
+            f"{what}: its function needs some of q, v, a, tau and t, got {sorted(map(str, needs))}."
+        )
+    wanted = {"values": (2, size)} | {f"slopes in {x}": (2, size, n) for x in needs - {"t"}}
+    for name, shape in wanted.items():
+        if found.get(name) != shape:
+            raise InputError(
+                f"{what}: the {name} of its function must have shape {shape} at two instants, got "
+                f"{found.get(name, 'none')}."
+            )
+    return y
 
 
 def _called(given: Callable[..., Any], what: str, symbols: dict[str, ca.SX]) -> ca.SX:
