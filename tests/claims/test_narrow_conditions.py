@@ -185,3 +185,30 @@ def test_a_motion_says_which_bounds_are_no_expressions_of_time(
     assert found.success, found.message
     said = "2,000 instants, as its bounds cannot be bounded between them: narrower features may be"
     assert any(said in each for each in found.trajectory.cautions) is not is_read
+
+
+@pytest.mark.parametrize("width", [1e-3, 1e-4, 1e-5, 1e-6])
+@pytest.mark.parametrize(
+    ("limits", "most"),
+    [({"base": "none", "tau": 20.0}, 20.0), ({"base": "none", "power": 45.0}, 45.0)],
+)
+def test_torques_that_an_effect_changes_in_a_short_way_are_limited(
+    two_link: hovi.Robot, limits: dict[str, Any], most: float, width: float
+) -> None:
+    """A peak of 30 N m where the shoulder passes 0.6 rad, which hardly costs anything."""
+    place, joint = 0.6, 'q["shoulder"]'
+    pulse = hovi.effects.Custom({"shoulder": f"-30 * exp(-(({joint} - {place}) / {width!r})**2)"})
+    scene = hovi.Scene(two_link, [hovi.effects.Gravity(), pulse])
+    found = hovi.plan(scene, [0.0, 0.0], [1.0, 0.5], 1.0, **{**OPTIONS, "limits": limits})
+    motion, low, high = found.trajectory, 0.0, 1.0
+    for _ in range(60):  # the shoulder turns forwards
+        middle = (low + high) / 2
+        before = motion.sample([middle]).q[0, 0] < place
+        low, high = (middle, high) if before else (low, middle)
+    speed = float(np.abs(motion.sample([low]).v[0, 0]))
+    at = motion.sample(low + 5 * width / speed * np.linspace(-1, 1, 4001))
+    worst = np.abs(at.tau * at.v if "power" in limits else at.tau).max()
+    assert not found.success or worst <= most * (1 + 4e-6)
+    alone = hovi.plan(scene, [0.0, 0.0], [1.0, 0.5], 1.0, **OPTIONS)
+    problem = dataclasses.replace(alone.problem, limits=hovi.as_limits(two_link, limits))  # type: ignore[type-var]
+    assert width > 2e-4 or not dataclasses.replace(alone, problem=problem).usable

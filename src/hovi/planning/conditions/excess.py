@@ -12,7 +12,14 @@ from hovi.discrete.trajectory import Trajectory
 from hovi.dynamics.torque_rate import TorqueRate
 from hovi.planning.conditions.condition import Condition, scales
 from hovi.planning.conditions.function import Points
-from hovi.planning.conditions.narrow import NO_BOUND, PEAK_FRACTION, NarrowCells, features_of
+from hovi.planning.conditions.joint_quantity import JointQuantity
+from hovi.planning.conditions.narrow import (
+    NO_BOUND,
+    PEAK_FRACTION,
+    NarrowCells,
+    TorqueCells,
+    features_of,
+)
 from hovi.planning.conditions.sets import Between, TwoSided
 from hovi.system.deadline import raise_if_late
 
@@ -147,6 +154,15 @@ def _narrow(motion: Trajectory, given: Condition[Between, Any]) -> NarrowCells:
     return NarrowCells(given, motion.grid, over, points)
 
 
+def _torque_cells(motion: Trajectory, given: Condition[TwoSided, Any]) -> Cells:
+    def over(k: Index, s: Array) -> Array:
+        return np.concatenate(_over(motion, given, k, s), axis=1)
+
+    limited = isinstance(given.y, JointQuantity)
+    joints = given.y.joints if isinstance(given.y, JointQuantity) else np.zeros(0, dtype=np.intp)
+    return TorqueCells(motion, over, joints, scales(given) if limited else np.ones(0)).cells
+
+
 def _found_along(motion: Trajectory, given: Condition[TwoSided, Any]) -> Excess:
     return _with_narrow(
         _excess_in(Cells.of(motion.grid.intervals, 1), motion, given), motion, given
@@ -154,10 +170,12 @@ def _found_along(motion: Trajectory, given: Condition[TwoSided, Any]) -> Excess:
 
 
 def _with_narrow(found: Excess, motion: Trajectory, given: Condition[TwoSided, Any]) -> Excess:
-    """The same, and what is exceeded in narrow cells; limits need none."""
-    if not isinstance(given.on, Between):
-        return found
-    cells = _narrow(motion, cast(Condition[Between, Any], given)).cells
+    """The same, and what is exceeded in narrow cells: of torques, and of a user's functions."""
+    cells = Cells.of(1, 1).chosen(np.zeros(0, dtype=np.intp))
+    if "tau" in given.y.needs:
+        cells = _torque_cells(motion, given)
+    if isinstance(given.on, Between):
+        cells = cells.joined(_narrow(motion, cast(Condition[Between, Any], given)).cells)
     if len(cells) == 0:
         return found
     (inside, s), (sides, at) = _excess_in(cells, motion, given), found

@@ -25,11 +25,14 @@ from hovi.discrete.cells import (
     between,
 )
 from hovi.discrete.grid import Grid
+from hovi.discrete.trajectory import Trajectory
 from hovi.effects.expressions.enclosure import Enclosure
 from hovi.planning.conditions.condition import Condition, scales
 from hovi.planning.conditions.expression import Expression
 from hovi.planning.conditions.function import ARGUMENTS, Points
 from hovi.planning.conditions.sets import Between
+from hovi.scene.effect_bounds import effect_bounds
+from hovi.scene.scene import Scene
 from hovi.system.dataclass import dataclass
 from hovi.system.deadline import raise_if_late
 
@@ -168,6 +171,49 @@ class NarrowCells:
         if self._of.whole:
             holds = np.asarray((bounds.upper <= 0.0).all(axis=1))
         return ~holds, ~bounds.calm & ~holds
+
+
+class TorqueCells:
+    """The cells of a motion in which effects change torques faster than its samples show."""
+
+    def __init__(self, motion: Trajectory, over: Sampled, joints: Index, scale: Array) -> None:
+        self._motion, self._over, self._joints, self._scale = motion, over, joints, scale
+        number = [motion.grid.intervals] if motion.segments is None else motion.segments.intervals
+        found = [_torque_bounds(scene) for scene in motion.scenes]
+        self._of = np.repeat(np.arange(len(found)), number) if found else np.zeros(0, dtype=np.intp)
+        self._effects = [(i, x, np.zeros(x.size)) for i, some in enumerate(found) for x in some]
+
+    @property
+    def cells(self) -> Cells:
+        """What is to be sampled anew."""
+        if not self._effects:
+            return Cells.of(1, 1).chosen(np.zeros(0, dtype=np.intp))
+        return _split_where(self._look, self._motion.grid)[0]
+
+    def _look(self, cells: Cells) -> tuple[Mask, Mask]:
+        """Cells in which an effect changes much, but for limits that are far from their bounds."""
+        k, s = np.repeat(cells.interval, 3), cells.inside(np.array([0.0, 0.5, 1.0]))
+        P, n = len(cells), self._motion.v.shape[1]
+        q, v, a = self._motion.jet_intervals(k, s)
+        t = self._motion.t[k] + s * self._motion.grid.steps[k]
+        boxes = [between(x.reshape(P, 3, -1)) for x in (q, v, a, np.zeros_like(v), t)]
+        wild, holds, width = np.zeros(P, dtype=bool), np.zeros(P, dtype=bool), np.zeros((P, n))
+        for number, effect, peaks in self._effects:
+            here = self._of[cells.interval] == number
+            bounds = effect([(low[here], high[here]) for low, high in boxes], CHANGE, peaks)
+            wild[here] |= ~bounds.calm
+            width[here] += bounds.width
+        if len(self._joints):
+            over = self._over(k, s).reshape(P, 3, 2, -1).max(axis=(1, 2))
+            most = over + width[:, self._joints] / self._scale
+            holds = np.asarray((most <= -PEAK_FRACTION).all(axis=1))
+        return ~holds, wild & ~holds
+
+
+@lru_cache(maxsize=64)
+def _torque_bounds(scene: Scene) -> tuple[Enclosure, ...]:
+    """Of the torques of effects that are more than sums and products."""
+    return tuple(x.value for x in effect_bounds(scene) if x.is_torque and x.value.known)
 
 
 @lru_cache(maxsize=64)

@@ -26,7 +26,7 @@ from hovi.discrete.trajectory import Trajectory
 from hovi.effects.expressions.interval_rules import Array, Bound
 from hovi.effects.expressions.time_parts import TimePart, from_line
 from hovi.planning.problem.presolve.formulas_of_time import base_parts
-from hovi.planning.refinement.faults.effect_bounds import EffectBounds, effect_bounds
+from hovi.scene.effect_bounds import EffectBounds, effect_bounds
 from hovi.scene.lagrangian import Lagrangian
 from hovi.scene.scene import Scene
 from hovi.scene.segmented_lagrangian import SegmentedLagrangian
