@@ -957,7 +957,7 @@ _rule(
     "few steps where the duration moves",
     "With a free duration such a solve has at most 25 steps.",
     "_solved_tighter",
-    "search.timed",
+    "search.free_duration",
     "False",
 )
 _rule(

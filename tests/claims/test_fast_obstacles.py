@@ -5,6 +5,7 @@ Distances by Coal on the given collision meshes, at instants that are dense wher
 
 from __future__ import annotations
 
+import dataclasses
 import warnings
 from typing import Any
 
@@ -89,6 +90,17 @@ def test_a_ball_that_crosses_the_way_is_avoided_or_said(at: float, width: float)
     found = planned([ball])
     assert_clear(found, where, at, width, 0.03)
     assert not found.success or found.cost > FREE.cost
+
+
+@pytest.mark.parametrize("at", [0.3371, 0.7423])
+def test_margins_see_a_ball_that_passes_between_two_samples(at: float) -> None:
+    ball, where = flying_ball(at, 2e-4, np.array([0.0, 2.0, 0.0]), 1.2)
+    assert FREE.problem is not None
+    problem = dataclasses.replace(FREE.problem, clearance=hovi.Clearance([ball]))
+    margins = dataclasses.replace(FREE, problem=problem).margins()
+    least = least_distance(FREE.trajectory, where, 1.2, np.array([at]))
+    assert margins.distance is not None
+    assert margins.distance <= least + SLACK
 
 
 def test_margins_of_a_motion_that_cannot_avoid_it_see_the_ball() -> None:

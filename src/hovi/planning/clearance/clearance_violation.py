@@ -59,7 +59,9 @@ def closest_along(trajectory: Trajectory, distances: Distances, least: float) ->
     """As `approach_along`, refined where they are near the least of all, too."""
     nearest, at = _nearest(*_sampled(trajectory, distances, np.inf))
     first = float((nearest - distances.allowance).min())
-    return _refined(trajectory, distances, nearest, at, max(least, first) + REFINEMENT_DISTANCE)
+    below = max(least, first) + REFINEMENT_DISTANCE
+    nearest, at = _with_fast(trajectory, distances, below, nearest, at)
+    return _refined(trajectory, distances, nearest, at, below)
 
 
 def nearest_pair(
