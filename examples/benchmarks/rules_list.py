@@ -585,13 +585,6 @@ _rule(
     "True",
 )
 _rule(
-    "anew where a central path fails",
-    "Without known rows a solve from the guess follows one along the central path.",
-    "_solved_nearby",
-    "along is not None and along.rows is None and not ended.settled",
-    "False",
-)
-_rule(
     "follow the solution",
     "Whole Newton steps from the last solution within limits.",
     "_followed",
@@ -701,20 +694,6 @@ _rule(
     "problem.has_limits or problem.clearance.self_collision",
     "False",
 )
-_rule(
-    "try rows then points",
-    "Where a solve with rows finds no motion, one at the points is tried.",
-    "InteriorPoint._solved",
-    'self.distances == "rows" or found.status not in WITHOUT_MOTION',
-    "True",
-)
-_rule(
-    "without pairs first",
-    "Without limits a solve without any pair comes first.",
-    "InteriorPoint._solved",
-    "not problem.has_limits",
-    "False",
-)
 _at("distances", "planning.solver.methods.active_pairs")
 _rule(
     "pairs that touch at first",
@@ -722,20 +701,6 @@ _rule(
     "_Rounds.run",
     "self._too_close(self._problem, path, FIRST_BEYOND)",
     "np.zeros(0, dtype=np.intp)",
-)
-_rule(
-    "add near pairs, too",
-    "Where pairs are too close, all within 2 cm are added.",
-    "_Rounds._violating",
-    "self._too_close(result.problem, result.path, ADDED_BEYOND)",
-    "self._too_close(result.problem, result.path)",
-)
-_rule(
-    "again from the guess",
-    "After a solve without any pair the next begins at the guess.",
-    "_Rounds.run",
-    "len(chosen) == 0 and result.nit > 0",
-    "False",
 )
 _at("distances", "planning.solver.methods.cleared_motion")
 _rule(
@@ -774,13 +739,6 @@ _rule(
     "False",
 )
 _rule(
-    "the other rough motion",
-    "Where the better rough motion diverges, the other is solved on.",
-    "cleared_motion",
-    "ended.why is not Reason.DIVERGED",
-    "True",
-)
-_rule(
     "rows ahead",
     "Pairs within 6 cm get rows before a rough motion is solved.",
     "_rough_with_distances",
@@ -810,13 +768,6 @@ _rule(
     "_solved_among_obstacles(search, path, search.clearance)",
     "None",
     False,
-)
-_rule(
-    "stages out of obstacles",
-    "At the points, a motion is moved out of obstacles by 4 cm at a time.",
-    "_moved_out_of_obstacles",
-    "int(np.clip(np.ceil(depth / STAGE_DEPTH), 1, MAX_STAGES))",
-    "1",
 )
 _rule(
     "without obstacles first",
@@ -1007,34 +958,12 @@ _rule(
     "[search.guess]",
     False,
 )
-_rule(
-    "minimum without limits",
-    "A restored motion that is stationary without violation is a minimum.",
-    "restored_motion",
-    "violation == 0.0",
-    "False",
-)
-_at("attempts", "planning.solver.longer_way_back")
-_rule(
-    "longer way back",
-    "A start outside its limits gets twice the time for its way back, twice.",
-    "minimized",
-    "found.status is not Status.INFEASIBLE or limits is None or not limits.excused",
-    "True",
-)
 _at("durations", "planning.search.joint_duration")
 _rule(
     "joint solve",
     "Motion and duration are solved for together where that is supported.",
     "joint_minimum",
     "not solves_jointly(problem)",
-    "True",
-)
-_rule(
-    "search again on the new grid",
-    "A search whose duration is not the best on its grid is repeated there.",
-    "best_on_its_grid",
-    "not found.solution.success or is_best(found)",
     "True",
 )
 _at("durations", "planning.solver.free_duration.timed_search")
@@ -1046,13 +975,6 @@ _rule(
     "False",
 )
 _at("durations", "planning.search.free_duration")
-_rule(
-    "failed duration again from near",
-    "A duration that failed from a distant motion is tried from the nearest.",
-    "_Search._next_duration",
-    "beyond.guess_duration == here.duration",
-    "True",
-)
 _rule(
     "jumps end a bracket",
     "A jump of the cost within a narrow bracket ends the search for a root.",
@@ -1308,20 +1230,6 @@ _rule(
     "_attempts",
     "job.held_at(attempt.guess.q[-1]) if first.isolated or to_branch else None",
     "None",
-)
-_rule(
-    "guesses to other branches",
-    "Up to three other branches of a frame goal are tried.",
-    "_free_attempts",
-    "first.branches[:FURTHER_BRANCHES]",
-    "()",
-)
-_rule(
-    "further paths",
-    "Further paths of OMPL, and distances at points, where path and direct guess fail.",
-    "_free_attempts",
-    "not rows",
-    "True",
 )
 _rule(
     "basin hopping",

@@ -9,7 +9,7 @@ import pytest
 
 import hovi
 from hovi.planning.paths import first_guesses as module
-from hovi.planning.paths.first_guesses import FURTHER, FirstGuesses, first_guesses
+from hovi.planning.paths.first_guesses import FirstGuesses, first_guesses
 from hovi.robot.robot import Robot
 from hovi.system.deadline import Deadline
 from planning.paths.test_path_guess import ball, problem_of
@@ -113,22 +113,3 @@ def test_where_no_start_succeeds_the_message_says_what_was_tried(two_link: Robot
 def test_a_direct_guess_alone_has_nothing_to_say(two_link: Robot) -> None:
     found = FirstGuesses(problem_of(two_link, ball()).guess("cubic"))
     assert found.sentence(False, False) == ""
-
-
-@needs_ompl
-def test_further_paths_are_others(two_link: Robot) -> None:
-    problem = problem_of(two_link, ball())
-    found = first_guesses(problem, problem.guess("cubic"), 1, 0, Deadline(), silent)
-    further = found.further()
-    assert len(further) == FURTHER
-    middles = [path.q[len(path.q) // 2] for path in (*found.paths, *further)]
-    assert len(np.unique(np.round(middles, 6), axis=0)) > 1
-
-
-@needs_ompl
-def test_out_of_time_there_are_no_further_paths(two_link: Robot) -> None:
-    problem = problem_of(two_link, ball())
-    deadline = Deadline(1e3)
-    found = first_guesses(problem, problem.guess("cubic"), 1, 0, deadline, silent)
-    with Deadline(1e-9).in_force():
-        assert len(found.further()) == 0

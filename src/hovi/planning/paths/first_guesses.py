@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from functools import partial
+from collections.abc import Callable
 
 import numpy as np
 
@@ -16,9 +15,6 @@ from hovi.system.deadline import Deadline, OutOfTimeError
 
 MAX_PATHS = 8
 """Maximum number of starts from paths."""
-FURTHER = 4
-"""Number of paths that are drawn where neither the first one nor the direct guess leads to a
-motion."""
 PATH_FRACTION = 0.2
 """Fraction of the time limit for finding paths."""
 
@@ -27,14 +23,13 @@ PATH_FRACTION = 0.2
 class FirstGuesses:
     """A direct guess, how deep in obstacles it is, in [m], and guesses along paths around them.
 
-    further: draws other paths, where there are any. branches: guesses to other configurations at
-    the goal. isolated: whether these, and that of the direct guess, are isolated there.
+    branches: guesses to other configurations at the goal. isolated: whether these, and that of the
+        direct guess, are isolated there.
     """
 
     direct: DiscretePath
     depth: float = -np.inf
     paths: tuple[DiscretePath, ...] = ()
-    further: Callable[[], Sequence[DiscretePath]] = tuple
     branches: tuple[DiscretePath, ...] = ()
     isolated: bool = False
 
@@ -89,9 +84,8 @@ def first_guesses(
     if depth < DEEP or not has_ompl():
         return FirstGuesses(direct, depth)
     progress("looking for paths around the obstacles", 0.0)
-    draw = partial(_drawn, problem, direct, deadline)
-    paths = draw(min(max(starts - 1, 1), MAX_PATHS), seed)
-    return FirstGuesses(direct, depth, paths, partial(draw, FURTHER, seed + 1))
+    paths = _drawn(problem, direct, deadline, min(max(starts - 1, 1), MAX_PATHS), seed)
+    return FirstGuesses(direct, depth, paths)
 
 
 def _drawn(

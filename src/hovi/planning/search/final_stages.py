@@ -196,7 +196,7 @@ class FinalStages:
         """A minimum with its best duration, to the tolerance if there is one."""
         # Here, since most plans have a given duration, and start without these modules.
         from hovi.planning.search.free_to_tolerance import free_to_tolerance
-        from hovi.planning.search.joint_duration import best_on_its_grid
+        from hovi.planning.search.joint_duration import best_duration_by, unless_best
 
         solve_for = self._stretched(self.fine.grid)
         first = dataclasses.replace(solution, problem=on_grid_of(self.fine.problem(), solution))
@@ -204,7 +204,8 @@ class FinalStages:
             first = solve_for(self.fine.grid.duration, solution.trajectory)
         jointly = partial(self._solve_jointly, free)
         if self.fine.tolerance is None:
-            return best_on_its_grid(free, self._stretched, first, jointly=jointly).with_time()
+            solve = self._stretched(first.trajectory.grid)
+            return unless_best(best_duration_by(free, solve, first, jointly=jointly)).with_time()
         refine = partial(self.refined, self.fine.tolerance, f"{which}: ")
         return free_to_tolerance(free, self._stretched, refine, first, jointly)
 
@@ -265,13 +266,6 @@ def with_more_points(job: Job) -> Job:
 
 def on_grid_of(problem: TrajectoryProblem, solution: Solution) -> TrajectoryProblem:
     """The problem on the solution's grid, whose intervals may have been split for limits."""
-    grid, known = solution.trajectory.grid, solution.problem
-    if known is not None and _window(known) > _window(problem):  # none was found within the other
-        return known
+    grid = solution.trajectory.grid
     same = np.array_equal(grid.steps, problem.grid.steps)
     return problem if same else problem.on(grid)
-
-
-def _window(problem: TrajectoryProblem) -> float:
-    """Fraction of the motion in which a start outside its limits is led back; 0 without limits."""
-    return 0.0 if problem.limits is None else problem.limits.window

@@ -156,13 +156,12 @@ def best_duration(
 class _Trial:
     """A solution for a duration.
 
-    duration: as requested, in [s]. weight: of time. guess_duration: that of the guess, in [s].
+    duration: as requested, in [s]. weight: of time.
     """
 
     duration: float
     solution: Solution
     weight: float
-    guess_duration: float
 
     @property
     def success(self) -> bool:
@@ -226,7 +225,7 @@ class _Search:
         T = float(np.clip(first.trajectory.duration, free.lower, free.upper))
         self.beyond: _Trial | None = None
         self.ending, self.at_jump = "", False
-        self._move_to(_Trial(T, first, free.weight, T))
+        self._move_to(_Trial(T, first, free.weight))
 
     def run(self) -> BestDuration:
         """The motion at the best duration, or the best so far if the search ended early."""
@@ -256,8 +255,7 @@ class _Search:
             return self._stride()
         if here.gap_to(beyond) > EDGE_PRECISION:
             return float(np.sqrt(here.duration * beyond.duration))
-        # a solve that failed from a distant guess may succeed from a near one
-        return None if beyond.guess_duration == here.duration else beyond.duration
+        return None
 
     def _stride(self) -> float | None:
         """A duration in the direction of decrease, in [s]; None at a bound."""
@@ -271,7 +269,7 @@ class _Search:
 
     def _take(self, trial: _Trial) -> None:
         """Move to a trial, bracket a root with it, or keep it as the one beyond."""
-        here, beyond = self.here, self.beyond
+        here = self.here
         if not trial.success:
             self.beyond = trial
         elif trial.downhill_to(here):
@@ -280,8 +278,6 @@ class _Search:
             self.beyond = trial
         else:
             self._move_to(trial)
-            if beyond is not None and beyond.duration == trial.duration:
-                self.beyond, self.stride = None, 1 + EDGE_PRECISION
 
     def _move_to(self, trial: _Trial) -> None:
         """Continue from a trial; the search ends if it is not a minimum or is stationary."""
@@ -350,7 +346,7 @@ class _Search:
         self.steps += solution.nit
         if solution.status in STOPPED:
             raise _StoppedError(solution.status, ended_search(solution.status))
-        return _Trial(T, solution, self.free.weight, guess.duration)
+        return _Trial(T, solution, self.free.weight)
 
     def _at_an_edge(self) -> BestDuration:
         """The motion at a bound, or next to durations that failed or cost more."""

@@ -12,7 +12,6 @@ from collections.abc import Iterator, Sequence
 from contextlib import closing
 from dataclasses import field
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -36,9 +35,6 @@ from hovi.system.interruption import record_interrupt
 from hovi.system.progress import Progress
 from hovi.workers.lost import Lost
 
-if TYPE_CHECKING:
-    from hovi.planning.solver.methods.interior_point import DistancesAt
-
 Array = npt.NDArray[np.float64]
 
 STARTS_PER_ROUND = 16
@@ -47,9 +43,6 @@ PERTURBED_MINIMA = 4
 """Number of minima that a round perturbs."""
 COMPARED_TIMES = 17
 """Number of times at which motions are compared."""
-FURTHER_BRANCHES = 3
-"""Number of other guesses to branches of a frame goal that a single start tries if the first one
-leads nowhere."""
 SAME_COST = 1e-6
 """Relative difference in cost up to which two minima count as the same."""
 
@@ -81,12 +74,9 @@ class Pool:
     deadline: Deadline = field(default_factory=Deadline)
     free: FreeDuration | None = None
 
-    def solve_all(
-        self, guesses: Sequence[DiscretePath], distances: DistancesAt | None = None
-    ) -> Solved:
+    def solve_all(self, guesses: Sequence[DiscretePath]) -> Solved:
         """The solutions from the guesses, without those whose process died.
 
-        distances: where they are bounded, for a single guess with the method InteriorPoint.
         If worker processes cannot be started, the guesses are solved in this one. Raises
         KeyboardInterrupt after an interrupt if there is no solution yet.
         """
@@ -94,7 +84,7 @@ class Pool:
         try:
             if min(self.processes, len(guesses)) > 1:
                 self._in_workers(guesses, results)
-            self._here(guesses, results, distances)
+            self._here(guesses, results)
         except KeyboardInterrupt:
             record_interrupt()
             if not results:
@@ -117,7 +107,6 @@ class Pool:
         self,
         guesses: Sequence[DiscretePath],
         results: dict[int, Solution | Lost],
-        distances: DistancesAt | None = None,
     ) -> None:
         """Add the results that are missing; none of them if the time limit is why."""
         for i, guess in enumerate(guesses):
@@ -126,7 +115,7 @@ class Pool:
             if results and self.deadline.passed:
                 return
             left = self.deadline.seconds_left
-            results[i] = solution = _solve(self.job, self.free, guess, left, distances)
+            results[i] = solution = _solve(self.job, self.free, guess, left)
             if solution.status is Status.INTERRUPTED:
                 return
 
@@ -145,15 +134,10 @@ def _solve(
     free: FreeDuration | None,
     guess: DiscretePath,
     time_limit: float | None,
-    distances: DistancesAt | None = None,
 ) -> Solution:
     """The solution from one guess, without the problem, which is not sent."""
     problem, most = job.problem(), job.options.max_iterations
-    solution = method = None
-    if distances is not None:
-        from hovi.planning.solver.methods.interior_point import InteriorPoint  # 10 ms
-
-        method = InteriorPoint(distances=distances)
+    solution = None
     if free is not None:
         from hovi.planning.search.joint_duration import joint_minimum  # rarely needed
 
@@ -164,7 +148,6 @@ def _solve(
             guess,
             max_iterations=most,
             time_limit=time_limit,
-            method=method,
             barrier=job.barrier,
         )
     return dataclasses.replace(solution, problem=None, model=None)
@@ -241,24 +224,16 @@ def explore(
 
 
 def _from_path_or_direct(pool: Pool, first: FirstGuesses, progress: Progress) -> Exploration:
-    """A single start: the first path or branch, and other guesses while no solution is found.
-
-    A motion that is left, as at an iteration limit, ends the search among rows of distances: from
-    there more steps are closer to a minimum than another guess is.
-    """
-    from hovi.planning.solver.methods.interior_point import WITHOUT_MOTION, takes_rows  # 10 ms
-
-    rows = bool(first.paths) and pool.free is None and takes_rows(pool.job.problem())
+    """A single start: the first path or branch, and other guesses while no solution is found."""
     tried, by_path, stopped = list[Solution](), list[Trajectory](), False
-    closer = False  # whether a motion is worth more steps
     goals = list[State | None]()  # where the ends of these motions are held
-    for attempt in _attempts(first, rows, pool.job):
+    for attempt in _attempts(first, pool.job):
         if tried:
             progress(attempt.text, 0.5)
         goal = attempt.goal
         solving = pool if goal is None else dataclasses.replace(pool, job=pool.job.to(goal))
         try:
-            found = solving.solve_all([attempt.guess], attempt.way)  # a single one in this process
+            found = solving.solve_all([attempt.guess])  # a single one in this process
         except KeyboardInterrupt:
             if not tried:
                 raise
@@ -269,9 +244,7 @@ def _from_path_or_direct(pool: Pool, first: FirstGuesses, progress: Progress) ->
         tried.append(solution)
         goals.append(goal)
         by_path += [solution.trajectory] * attempt.by_path
-        closer = closer or (attempt.way == "rows" and solution.status not in WITHOUT_MOTION)
-        ended = solution.success or stopped or pool.deadline.passed
-        if ended or (closer and len(tried) > 1):  # the direct guess is tried in any case
+        if solution.success or stopped or pool.deadline.passed:
             break
     minima = distinct(tried)
     goal = next(at for each, at in zip(tried, goals, strict=True) if each is minima[0])
@@ -282,24 +255,23 @@ def _from_path_or_direct(pool: Pool, first: FirstGuesses, progress: Progress) ->
 class _Attempt:
     """A solve from a guess.
 
-    by_path: whether it is a path by OMPL. way: where distances are bounded. text: for the progress.
-    goal: where its end is held; None if that of the job.
+    by_path: whether it is a path by OMPL. text: for the progress. goal: where its end is held; None
+    if that of the job.
     """
 
     guess: DiscretePath
     by_path: bool
-    way: DistancesAt | None
     text: str
     goal: State | None = None
 
 
-def _attempts(first: FirstGuesses, rows: bool, job: Job) -> Iterator[_Attempt]:
+def _attempts(first: FirstGuesses, job: Job) -> Iterator[_Attempt]:
     """Solves from the guesses, with the end held in isolated configurations.
 
     A free end may slide along the goal's equations until the solve fails, so that the first branch
     is tried with its end held in any case.
     """
-    for attempt in _free_attempts(first, rows):
+    for attempt in _free_attempts(first):
         to_branch = attempt.guess is first.direct and not first.paths
         goal = job.held_at(attempt.guess.q[-1]) if first.isolated or to_branch else None
         if goal is None or not first.isolated:
@@ -309,28 +281,11 @@ def _attempts(first: FirstGuesses, rows: bool, job: Job) -> Iterator[_Attempt]:
             yield dataclasses.replace(attempt, goal=goal, text=text)
 
 
-def _free_attempts(first: FirstGuesses, rows: bool) -> Iterator[_Attempt]:
-    """The first path, and the direct guess; with rows of distances, further paths after these.
-
-    The last two attempts have distances at quadrature points instead, which takes far longer.
-    """
-    way: DistancesAt | None = "rows" if rows else None
-    direct = _Attempt(first.direct, False, way, "from the direct guess")
-    if not first.paths:
-        yield direct
-        for branch in first.branches[:FURTHER_BRANCHES]:
-            yield _Attempt(branch, False, way, "from another guess to the goal")
-        return
-    path = first.paths[0]
-    yield _Attempt(path, True, way, "from a path")
-    yield direct
-    if not rows:
-        return
-    for further in first.further():
-        yield _Attempt(further, True, way, "from another path")
-    at_points = ", distances at quadrature points"
-    yield _Attempt(path, True, "points", f"from the path{at_points}")
-    yield dataclasses.replace(direct, way="points", text=f"from the direct guess{at_points}")
+def _free_attempts(first: FirstGuesses) -> Iterator[_Attempt]:
+    """The first path, if there is one, and the direct guess."""
+    if first.paths:
+        yield _Attempt(first.paths[0], True, "from a path")
+    yield _Attempt(first.direct, False, "from the direct guess")
 
 
 def _round(

@@ -31,7 +31,6 @@ from hovi.planning.problem.units import as_time_limit, seconds
 from hovi.planning.solver.answer import Answer, answered
 from hovi.planning.solver.initial_path import guess_path, turned_on
 from hovi.planning.solver.limits.row_forces import at_instants
-from hovi.planning.solver.longer_way_back import minimized
 from hovi.planning.solver.methods.choice import method_for
 from hovi.planning.solver.methods.method import Method, Report
 from hovi.planning.solver.methods.stationary import Stationary
@@ -361,7 +360,7 @@ def solve_on_grid(
 
     def solved() -> Answer:
         with Deadline(time_limit).in_force():
-            return minimized(method, problem, start, criteria, report)
+            return method.minimize(problem, start, criteria, report)
 
     result = answered(solved, partial(_the_guess, problem, path))
     return solution_of(result, started - began, time.perf_counter() - started)

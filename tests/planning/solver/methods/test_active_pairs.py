@@ -25,8 +25,6 @@ from hovi.system.deadline import OutOfTimeError
 Array = npt.NDArray[np.float64]
 START, GOAL, T = [-1.2, 0.4], [0.9, 0.4], 1.7
 LIMITS = {"base": "none", "v": 6.0}
-APART = [0.0, -1.2, 0.3, -0.5, 0.3, 0.1], [0.8, -0.9, 0.1, -0.2, 0.6, 0.3]
-"""Ends between which the links of a UR5 stay apart."""
 FAR = hovi.Sphere([0.0, 2.8, 0.0], 0.1, name="far")
 OUT_OF_REACH = hovi.Sphere([9.0, 0.0, 0.0], 0.1, name="out of reach")
 
@@ -67,25 +65,16 @@ def test_obstacles_far_away_leave_every_digit_of_a_motion(
     assert kept.trajectory.metadata["clearance"]["obstacles"][0]["name"] == "far"
 
 
-@pytest.mark.parametrize("of", ["an obstacle", "itself"])
 @pytest.mark.parametrize(
     ("raised", "status"), [(KeyboardInterrupt, "interrupted"), (OutOfTimeError, "time_limit")]
 )
 def test_what_stops_the_last_check_of_distances_leaves_the_motion_found(
     arm_scene: hovi.Scene,
-    ur5: Robot,
     monkeypatch: pytest.MonkeyPatch,
-    of: str,
     raised: type[BaseException],
     status: str,
 ) -> None:
-    def planned(kept: bool) -> hovi.Solution:
-        if of == "an obstacle":
-            return reach(arm_scene, [FAR] if kept else [], "none")
-        given = {"limits": "none", "self_collision": kept, "scheme": "galerkin-2", "intervals": 16}
-        return hovi.plan(hovi.Scene(ur5, [hovi.effects.Gravity()]), *APART, 1.5, **given)
-
-    free, calls = planned(kept=False), []
+    free, calls = reach(arm_scene, [], "none"), []
 
     def stopped(*args: Any) -> Any:
         calls.append(args)
@@ -94,7 +83,7 @@ def test_what_stops_the_last_check_of_distances_leaves_the_motion_found(
         return near_pairs(*args)
 
     monkeypatch.setattr("hovi.planning.solver.methods.active_pairs.near_pairs", stopped)
-    found = planned(kept=True)
+    found = reach(arm_scene, [FAR], "none")
     assert found.status.value == status
     assert len(calls) == 2
     assert "before the distances along the motion were checked" in found.message

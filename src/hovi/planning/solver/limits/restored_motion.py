@@ -96,31 +96,20 @@ def restored_motion(search: BoundedSearch, ended: Bounded) -> tuple[Bounded, str
             again = search.solve(Start(path))
             if again.feasible or again.why in STOPPED:
                 return again, ""
-            if violation == 0.0 and why is Reason.STATIONARY:
-                return unlimited_minimum(search, path), ""
         if violation < least:
             least, ended.x = violation, path
-    _, ended.outputs, ended.z = _without_forces(search, known, ended.x)
+    ended.outputs, ended.z = _without_forces(search, known, ended.x)
     return ended, search.worst(ended.x)
-
-
-def unlimited_minimum(search: BoundedSearch, path: DiscretePath) -> Bounded:
-    """A minimum that no limit touches, which is one without limits as well."""
-    objective, outputs, barrier = _without_forces(search, None, path)
-    found = Bounded(path, outputs, barrier, Reason.STATIONARY)
-    none = np.zeros_like(outputs.y)
-    found.model = objective.model(path, none, none, none)
-    return found
 
 
 def _without_forces(
     search: BoundedSearch, known: Multipliers | None, path: DiscretePath
-) -> tuple[BoundedAction, Outputs, Barrier]:
-    """The objective with its first rows, its outputs at a path, and a barrier without forces."""
+) -> tuple[Outputs, Barrier]:
+    """The outputs at a path with the first rows, and a barrier without forces."""
     search.rows = search.coarse_rows()
     objective = search.objective(known)
     outputs = objective.outputs(path)
-    return objective, outputs, Barrier.inactive(objective.bounds, outputs.y)
+    return outputs, Barrier.inactive(objective.bounds, outputs.y)
 
 
 def _bumped_guess(search: BoundedSearch, seed: int, fraction: float = 1.0) -> DiscretePath:

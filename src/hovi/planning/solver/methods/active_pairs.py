@@ -35,8 +35,6 @@ Index = npt.NDArray[np.intp]
 FIRST_BEYOND = 0.002
 """Distance beyond the margin, in [m], up to which pairs along a guess are bounded at once:
 those that touch the margin along the motion of a similar problem."""
-ADDED_BEYOND = 0.02
-"""The same along a motion on which some pair violates it."""
 WITHOUT_LIMITS: tuple[Method, ...] = (TrustRegion(), AugmentedLagrangian())
 """Methods for a problem without limits of which no pair is near another."""
 
@@ -57,22 +55,6 @@ def with_active_pairs(
     if problem.distances is None or contradiction(problem, limits):
         return solve(problem, start, criteria)
     return _Rounds(solve, problem, start, criteria, report).run()
-
-
-def without_pairs(
-    solve: Solve,
-    problem: TrajectoryProblem,
-    start: Guess,
-    criteria: Criteria,
-    report: Report | None = None,
-) -> Answer | None:
-    """The motion of a problem without limits that keeps its distances of itself; else None.
-
-    It is not looked for where a guess does not keep them. Arguments as for `with_active_pairs`.
-    """
-    if problem.distances is None or contradiction(problem, no_limits(problem.coordinates)):
-        return None
-    return _Rounds(solve, problem, start, criteria, report).free()
 
 
 class _Rounds:
@@ -106,32 +88,13 @@ class _Rounds:
                 return _unfinished(result, more)
             if len(more) == 0:
                 break
-            free = len(chosen) == 0 and result.nit > 0
             chosen = np.union1d(chosen, more)
-            result = self._again(result, chosen, path if free else None)
+            result = self._solved(result.problem, result.path, chosen).after(result)
         return result
 
-    def free(self) -> Answer | None:
-        """A solve without any pair; None where one is too close, before or after it."""
-        path = self._start.x
-        try:
-            if len(self._too_close(self._problem, path, FIRST_BEYOND)) > 0:
-                return None
-        except OutOfTimeError:
-            return None
-        result = self._solved(self._problem, path, np.zeros(0, dtype=np.intp))
-        if result.status not in (Status.MINIMUM, Status.SADDLE):
-            return result
-        close = _unless_stopped(partial(self._too_close, result.problem, result.path))
-        if isinstance(close, Reason):
-            return _unfinished(result, close)
-        return None if len(close) > 0 else result
-
     def _violating(self, result: Answer, chosen: Index) -> Index:
-        """If other pairs violate the margin: those, and the pairs that are near."""
-        if np.isin(self._too_close(result.problem, result.path), chosen).all():
-            return np.zeros(0, dtype=np.intp)
-        return self._too_close(result.problem, result.path, ADDED_BEYOND)
+        """The other pairs that violate the margin."""
+        return np.setdiff1d(self._too_close(result.problem, result.path), chosen)
 
     def _criteria_left(self) -> Criteria:
         """The criteria with the remaining time as time limit."""
@@ -146,14 +109,6 @@ class _Rounds:
         with self._deadline.in_force():
             least = float(problem.clearance.margin) + beyond
             return near_pairs(problem.trajectory(path), problem.distances, least)
-
-    def _again(self, result: Answer, chosen: Index, free: DiscretePath | None) -> Answer:
-        """A solve with other pairs from the motion of a result, or from a guess that is free."""
-        if free is None:
-            again = self._solved(result.problem, result.path, chosen)
-        else:
-            again = self._solved(self._problem, free, chosen)
-        return again.after(result)
 
     def _solved(self, problem: TrajectoryProblem, path: DiscretePath, chosen: Index) -> Answer:
         """A solve with some pairs; its problem has all of them again."""

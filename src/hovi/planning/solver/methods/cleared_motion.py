@@ -63,7 +63,7 @@ def cleared_motion(search: BoundedSearch, guess: DiscretePath) -> Bounded:
     It is solved without distances, until it can be seen whether it keeps them. If it does not, a
     motion with seams is solved in subproblems, and then as a whole. Without them, or where that
     fails, it is moved out of the obstacles, and so is the guess if that takes a detour. The better
-    rough motion, by bounds and then by cost, is solved to its end; the other where that diverges.
+    rough motion, by bounds and then by cost, is solved to its end.
     """
     assert search.near is not None
     free = _without_distances(search, guess)
@@ -78,10 +78,9 @@ def cleared_motion(search: BoundedSearch, guess: DiscretePath) -> Bounded:
         if rough[0] is not None:
             steps = max(SECOND_STEPS * len(rough[0].ended.steps), LEAST_SECOND_STEPS)
         rough.append(_rough_with_distances(search, guess, min(steps, ROUGH_STEPS)))
-    for found in sorted(filter(None, rough), key=lambda each: each.rank):
-        ended = found.solved(search)
-        if ended.why is not Reason.DIVERGED:
-            return ended
+    best = min(filter(None, rough), key=lambda each: each.rank, default=None)
+    if best is not None:
+        return best.solved(search)
     raise_if_late()  # or more time might lead to one
     return dataclasses.replace(free, why=Reason.DIVERGED)
 

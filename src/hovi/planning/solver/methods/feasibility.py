@@ -23,12 +23,6 @@ from hovi.planning.solver.limits.restored_motion import locally_infeasible, rest
 from hovi.planning.solver.methods.bounded_search import Bounded, BoundedSearch
 from hovi.planning.solver.methods.cleared_motion import cleared_motion
 
-STAGE_DEPTH = 0.04
-"""Depth by which a motion is moved out of obstacles in one stage, in [m]."""
-MAX_STAGES = 8
-"""Maximum number of stages."""
-STAGE_STEPS = 80
-"""Maximum number of steps per stage, whose result is only a guess."""
 NEARBY_MU = 1e-2
 """First barrier parameter from a motion that nearly is a solution, relative to the mean density of
 the objective: a larger one moves it away from its bounds, and perhaps to another minimum."""
@@ -87,10 +81,6 @@ def _solved_nearby(search: BoundedSearch, path: DiscretePath) -> Bounded | None:
         most = min(WARM_STEPS, most)
     search.criteria = dataclasses.replace(whole, max_iterations=most)
     ended = solved_from(search, path) if along is None else _solved_along(search, along)
-    if along is not None and along.rows is None and not ended.settled:
-        search.rows, search.multipliers = search.coarse_rows(), None
-        search.near = None if search.near is None else search.no_near_rows()
-        ended = solved_from(search, path)
     search.criteria = whole
     left = whole.max_iterations - len(ended.steps)
     closer = ended.feasible and ended.why is Reason.ITERATION_LIMIT  # than a guess
@@ -251,29 +241,14 @@ def _solved_among_obstacles(
 def _moved_out_of_obstacles(
     search: BoundedSearch, path: DiscretePath, wanted: ClearanceOutputs
 ) -> DiscretePath:
-    """A guess: the motion of least action without obstacles, moved out of them in stages.
-
-    In one stage a motion deep in an obstacle would leave it on different sides at different times.
-    """
-    criteria, search.clearance = search.criteria, None
+    """A guess: the motion of least action without obstacles, or that given if none is found."""
+    search.clearance = None
     path = _without_obstacles(search, path)
-    approach = approach_along(search.problem.trajectory(path), wanted.distances, wanted.least)
-    depth = wanted.least - float(approach.distance.min())
-    stages = int(np.clip(np.ceil(depth / STAGE_DEPTH), 1, MAX_STAGES))
-    search.criteria = dataclasses.replace(criteria, max_iterations=STAGE_STEPS)
-    for fraction in np.arange(1, stages) / stages:
-        least = wanted.least - (1.0 - fraction) * depth
-        search.clearance = ClearanceOutputs(wanted.distances, least)
-        ended = search.solve(Start(path))
-        path = ended.x
-        if ended.why in STOPPED:
-            break
-    search.criteria, search.clearance = criteria, wanted
+    search.clearance = wanted
     return path
 
 
 def _without_obstacles(search: BoundedSearch, path: DiscretePath) -> DiscretePath:
-    """The motion without obstacles, or the guess if none is found."""
     if search.limits.bounded.any():
         ended = search.solve(Start(path))
         return ended.x if ended.feasible else path

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 from functools import partial
-from typing import Literal
 
 import numpy as np
 
@@ -15,7 +14,7 @@ from hovi.planning.problem.contradictions import contradiction
 from hovi.planning.problem.limits import no_limits
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.answer import Answer, answered
-from hovi.planning.solver.methods.active_pairs import with_active_pairs, without_pairs
+from hovi.planning.solver.methods.active_pairs import with_active_pairs
 from hovi.planning.solver.methods.bounded_search import BoundedSearch
 from hovi.planning.solver.methods.feasibility import feasible_motion
 from hovi.planning.solver.methods.limits_between_points import tightened, usable
@@ -24,15 +23,6 @@ from hovi.planning.solver.methods.torque_rates_last import with_torque_rates_las
 from hovi.planning.solver.non_finite import non_finite_condition, non_finite_sentence
 from hovi.planning.solver.outcome.cost_with_time import cost_of
 from hovi.planning.solver.status import Status, diverged, infeasible_sentence, unfinished
-from hovi.system.deadline import Deadline
-
-DistancesAt = Literal["rows", "points"]
-"""Where distances are bounded: in rows where pairs come near, or at quadrature points."""
-
-WITHOUT_MOTION = Status.INFEASIBLE, Status.DIVERGED, Status.SADDLE
-"""Results of a solve with rows of distances after which one at quadrature points may help."""
-STEPS_AT_POINTS = 200
-"""Maximum number of steps of each solve then: those that help take fewer."""
 
 
 def takes_rows(problem: TrajectoryProblem) -> bool:
@@ -50,13 +40,7 @@ class InteriorPoint(Method):
 
     First a motion within bounds at the quadrature points is found; then bounds are tightened and
     intervals halved until the limits hold everywhere to their tolerance.
-
-    distances: where they are bounded: in "rows", or at "points", which takes several times as long;
-        None for rows, and then points if these fail.
     """
-
-    def __init__(self, distances: DistancesAt | None = None) -> None:
-        self.distances = distances
 
     def supports(self, problem: TrajectoryProblem) -> bool:
         """Problems with limits or obstacles, with or without equality constraints."""
@@ -81,26 +65,10 @@ class InteriorPoint(Method):
         report: Report | None,
     ) -> Answer:
         """With rows for distances where pairs come near; in rounds where that is not supported."""
-        rounds = partial(with_active_pairs, partial(self._minimize, report=report), report=report)
-        if not takes_rows(problem):
-            return rounds(problem, start, criteria)
-        most = min(STEPS_AT_POINTS, criteria.max_iterations)
-        at_points = dataclasses.replace(criteria, max_iterations=most)
-        if self.distances == "points":
-            return rounds(problem, start, at_points)
-        deadline = Deadline(criteria.time_limit)
-        if not problem.has_limits:
-            free = without_pairs(
-                partial(self._minimize, report=report), problem, start, criteria, report
-            )
-            if free is not None:
-                return free
-            criteria = dataclasses.replace(criteria, time_limit=deadline.seconds_left)
-        found = self._minimize(problem, start, criteria, report, lazy=True)
-        if self.distances == "rows" or found.status not in WITHOUT_MOTION:
-            return found
-        at_points = dataclasses.replace(at_points, time_limit=deadline.seconds_left)
-        return rounds(problem, start, at_points).after(found)
+        if takes_rows(problem):
+            return self._minimize(problem, start, criteria, report, lazy=True)
+        solve = partial(self._minimize, report=report)
+        return with_active_pairs(solve, problem, start, criteria, report)
 
     def _minimize(
         self,
