@@ -613,13 +613,6 @@ _rule(
     "False",
 )
 _rule(
-    "adopt margins",
-    "So are the margins by which bounds are tightened.",
-    "_adopt",
-    "along.margins is not None and along.margins.shape == search.margins.shape",
-    "False",
-)
-_rule(
     "adopt rows of distances",
     "So are rows of distances.",
     "_adopt",
@@ -716,13 +709,6 @@ _rule(
     "_by_subproblems",
     "subproblems_of(search.problem)",
     "[]",
-)
-_rule(
-    "second level for subproblems",
-    "Where joining them fails, it is tried with a larger barrier.",
-    "_by_subproblems",
-    "SUBPROBLEM_LEVELS if subproblems else ()",
-    "SUBPROBLEM_LEVELS[:1] if subproblems else ()",
 )
 _rule(
     "push out of obstacles",
@@ -1118,13 +1104,6 @@ _rule(
     "and satisfies(known.problem, known.trajectory.path)",
     "False",
 )
-_rule(
-    "finer start moves along",
-    "A followed finer motion begins as far from the known one as the coarser did.",
-    "followed_within_limits",
-    "problem.coordinates.curved_space is None",
-    "False",
-)
 _at("refinement", "planning.refinement.nearby_minimum")
 _rule(
     "reused Hessians",
@@ -1140,14 +1119,6 @@ _rule(
     "Resolution.__call__",
     "self._kept_for(solution) if solution.success else None",
     "None",
-)
-_rule(
-    "follow the finer motion",
-    "The finer motion of a replanned one follows that of the last.",
-    "Resolution.__call__",
-    "self._followed(solution) or resolved(solution)",
-    "resolved(solution)",
-    False,
 )
 _at("refinement", "planning.search.final_stages")
 _rule(
@@ -1290,14 +1261,6 @@ _rule(
     "lighter_rotors",
     "not job.lagrangian().needs_torques",
     "True",
-)
-_rule(
-    "rotors without torque limits",
-    "Torque limits hold in the last stage of it alone.",
-    "lighter_rotors",
-    "_without_torque_limits(job)",
-    "job",
-    False,
 )
 _rule(
     "growing gravity",

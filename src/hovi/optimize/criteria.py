@@ -22,8 +22,6 @@ class Criteria:
     exact: stop only where rounding alone remains, after a Newton step of an exact model.
     plain: with bounds, take plain steps alone, each barrier parameter until its problem is solved:
         slower, and more robust.
-    outside: how far outputs may be outside their bounds at the end of `follow_bounded`, relative to
-        the range.
     barrier: its last parameter, relative to the mean density of the objective.
     enough: with bounds, stop within them where a whole Newton step predicts a smaller decrease,
         relative to the value, even if it would be cut short.
@@ -41,4 +39,3 @@ class Criteria:
     enough: float = 0.0
     stalled: float = 0.0
     plain: bool = False
-    outside: float = ROOM

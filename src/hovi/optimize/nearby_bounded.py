@@ -141,4 +141,4 @@ class _Newton(Generic[X]):
         if len(ended.steps) == 0 or ended.z.mu > self.last_mu:
             return False
         enough = max(self.criteria.decrease, self.criteria.enough) * abs(ended.outputs.value)
-        return self.outside <= self.criteria.outside and max(decrease, self.work) <= enough
+        return self.outside <= ROOM and max(decrease, self.work) <= enough

@@ -33,7 +33,6 @@ from hovi.planning.solver.central_path import CentralPath
 from hovi.planning.solver.outcome.cost_with_time import cost_of, price_of_time
 from hovi.planning.solver.receding.last_motion import satisfies
 from hovi.planning.solver.solver import Solution, solve_on_grid
-from hovi.robot.space.coordinates import Coordinates
 from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
@@ -187,35 +186,6 @@ def richer_within_limits(
     return dataclasses.replace(found, finish=partial(_finished, found, central.level))
 
 
-def followed_within_limits(
-    solution: Solution, known: FinerSolution, before: DiscretePath
-) -> FinerSolution | None:
-    """The finer solution within limits, followed from that of a motion between other ends.
-
-    Without gains, and with nothing more to finish. known: that of the other motion, whose path on
-    the solution's grid is `before`: the finer path begins as far from it as the solution is. None
-    where it does not belong to the solution's grid, or is too far away.
-    """
-    problem, path = solution.problem, solution.trajectory.path
-    assert problem is not None
-    if known.central is None or problem.constrained:
-        return None
-    if not np.array_equal(known.problem.grid.steps, problem.grid.steps):
-        return None
-    fine = known.problem.between(problem.start, problem.goal)
-    from hovi.planning.solver.methods.feasibility import follow  # 10 ms
-
-    start = known.central.last
-    if problem.coordinates.curved_space is None:
-        start = displaced(start, before, path, problem.coordinates)
-    central = follow(fine, known.central.ending_at(start), RICHER_BARRIER)
-    if central is None:
-        return None
-    cost, coarse = cost_of(fine, central.last), cost_of(problem, path)
-    gains = np.full(problem.grid.intervals, np.nan)
-    return FinerSolution(fine, central.last, cost, coarse, gains, lambda: None, central)
-
-
 def _finished(found: FinerSolution, barrier: float) -> Solution | None:
     """A motion that is no minimum yet, or whose limits were not checked, solved to the end.
 
@@ -324,21 +294,6 @@ def prolonged(path: DiscretePath, fine: Grid) -> DiscretePath:
     inner = np.zeros((N, fine.inner_modes, n))
     inner[:, :r] = path.inner
     return DiscretePath(path.q, path.v, path.z, inner, path.higher)
-
-
-def displaced(
-    path: DiscretePath, before: DiscretePath, after: DiscretePath, on: Coordinates
-) -> DiscretePath:
-    """A path moved by the change of another one with at most as many inner modes."""
-    inner, r = path.inner.copy(), before.inner.shape[1]
-    inner[:, :r] += after.inner - before.inner
-    return DiscretePath(
-        on.integrate(path.q, on.difference(before.q, after.q)),
-        path.v + (after.v - before.v),
-        path.z + (after.z - before.z),
-        inner,
-        path.higher + (after.higher - before.higher),
-    )
 
 
 def _gains(expansion: Expansion, values: Array, ends: int) -> Array:

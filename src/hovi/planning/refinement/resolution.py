@@ -24,7 +24,6 @@ from hovi.planning.refinement.error_estimate import (
     LIMITED_SAFETY_FACTOR,
     FinerSolution,
     finer_than,
-    followed_within_limits,
     prolonged,
     with_estimate,
     with_metadata,
@@ -155,7 +154,7 @@ def resolved(solution: Solution) -> Solution:
         solution = judged(solution)
         if not solution.success:
             return solution
-        solution, reason, finer = _checked(solution)
+        solution, reason = _checked(solution)
     except OutOfTimeError:
         return _not_checked(solution)
     if reason and is_late():  # perhaps only as the finer solve was ended
@@ -164,15 +163,15 @@ def resolved(solution: Solution) -> Solution:
         return _unresolved(solution, reason)
     if solution.status is Status.STATIONARY:
         return dataclasses.replace(solution, check=resolved)
-    return dataclasses.replace(solution, check=Resolution.of(solution, finer))
+    return dataclasses.replace(solution, check=Resolution.of(solution))
 
 
-def _checked(solution: Solution) -> tuple[Solution, str, FinerSolution | None]:
-    """The solution with an estimate, why it is no minimum along its way or "", and a finer one."""
+def _checked(solution: Solution) -> tuple[Solution, str]:
+    """The solution with an estimate, and why it is no minimum along its way, or ""."""
     reason, finer = fault_of_period(solution) or fault_on_curve(solution), None
     if solution.status is Status.STATIONARY:
         solution, reason = (solution, reason) if reason else _compared_with_stationary(solution)
-        return *((solution, reason) if reason else with_features(solution)), None
+        return (solution, reason) if reason else with_features(solution)
     if not reason and solution.error_estimate is None and solution.accuracy is None:
         solution, reason, finer = _compared_with_finer(solution)
     elif not reason and not costs_nothing(solution):
@@ -182,7 +181,7 @@ def _checked(solution: Solution) -> tuple[Solution, str, FinerSolution | None]:
         reason = reason or fault_of(solution, error, finer)
     if not reason:
         solution, reason = with_features(solution)
-    return solution, reason, finer
+    return solution, reason
 
 
 def unresolved_if_spinning(solution: Solution) -> Solution:
@@ -203,22 +202,20 @@ class Resolution(MotionCheck):
     """The check of motions that are replanned from a resolved one.
 
     path, cost: of the resolved motion. estimate: of the relative error of its cost, kept for
-    motions near it. finer: the solution it was compared with, or None. motion: the resolved one;
-    None for the rest of a longer one.
+    motions near it. motion: the resolved one; None for the rest of a longer one.
     """
 
     path: DiscretePath
     cost: float
     estimate: float
-    finer: FinerSolution | None = None
     motion: Solution | None = None
 
     @classmethod
-    def of(cls, solution: Solution, finer: FinerSolution | None) -> Self:
-        """That of a solution with an estimate. finer: the one it was compared with."""
+    def of(cls, solution: Solution) -> Self:
+        """That of a solution with an estimate."""
         assert solution.error_estimate is not None
         motion = dataclasses.replace(solution, check=None)
-        return cls(solution.trajectory.path, solution.cost, solution.error_estimate, finer, motion)
+        return cls(solution.trajectory.path, solution.cost, solution.error_estimate, motion)
 
     @cached_property
     def on_curve(self) -> float:
@@ -250,7 +247,7 @@ class Resolution(MotionCheck):
             return _not_checked(solution)
         estimate = self._kept_for(solution) if solution.success else None
         if estimate is None:
-            return self._followed(solution) or resolved(solution)
+            return resolved(solution)
         reason = fault_of_period(solution)
         if self.on_curve > SMALL_DIFFERENCE:
             reason = reason or fault_on_curve(solution)
@@ -259,24 +256,6 @@ class Resolution(MotionCheck):
         if reason:
             return _unresolved(solution, reason)
         return dataclasses.replace(solution, check=self)
-
-    def _followed(self, solution: Solution) -> Solution | None:
-        """As `resolved`, compared with the followed finer solution; None where that fails."""
-        if self.finer is None or not solution.success:
-            return None
-        try:
-            finer = followed_within_limits(solution, self.finer, self.path)
-        except OutOfTimeError:
-            return _not_checked(solution)
-        if finer is None or fault_of_period(solution) or fault_on_curve(solution):
-            return None
-        compared, reason = _compared(solution, finer)
-        if reason or compared.error_estimate is None:
-            return None
-        compared, reason = with_features(compared)
-        if reason:
-            return _unresolved(compared, reason)
-        return dataclasses.replace(compared, check=Resolution.of(compared, finer))
 
     def shifted(self, shift: Shift, problem: TrajectoryProblem) -> Check:
         """The same for the rest of the motion, where the error of the cost is as large.

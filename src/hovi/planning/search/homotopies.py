@@ -61,10 +61,7 @@ Homotopy = Callable[[Job], list[Stage]]
 
 
 def lighter_rotors(job: Job) -> list[Stage]:
-    """Rotor inertia c on every joint, M(q) + c 1, with c decreasing to zero.
-
-    Torque limits apply in the last stage only.
-    """
+    """Rotor inertia c on every joint, M(q) + c 1, with c decreasing to zero."""
     if not job.lagrangian().needs_torques:
         return []  # rotors change no cost
     robot = job.scene.robot
@@ -72,12 +69,11 @@ def lighter_rotors(job: Job) -> list[Stage]:
     M = MassMatrix(job.scene.model)(q[None])[0]
     inertia = FIRST_ROTOR_RATIO * float(M.diagonal().max())
     least = LAST_ROTOR_RATIO * float(np.linalg.eigvalsh(M)[0])
-    free = _without_torque_limits(job)
     stages = []
     while inertia > least:
         scene = _with_effect(job.scene, HeavierRotors(inertia))
         stages.append(
-            Stage(f"rotors of {inertia:.2g} kg m^2", dataclasses.replace(free, scene=scene))
+            Stage(f"rotors of {inertia:.2g} kg m^2", dataclasses.replace(job, scene=scene))
         )
         inertia /= ROTOR_REDUCTION
     return stages
@@ -136,10 +132,6 @@ def narrowing_limits(job: Job) -> list[Stage]:
 
 def _with_effect(scene: Scene, effect: Effect) -> Scene:
     return dataclasses.replace(scene, effects=[*scene.effects, effect])
-
-
-def _without_torque_limits(job: Job) -> Job:
-    return job.with_options(limits=job.limits.without("tau"))
 
 
 def _widened(limits: Limits, factor: float) -> Limits:

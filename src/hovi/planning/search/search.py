@@ -117,7 +117,7 @@ class Search:
         motion = with_metadata(free.trajectory, clearance=clearance.to_dict())
         kept = dataclasses.replace(kept, trajectory=motion)
         known = free.check is not None and free.error_estimate is not None
-        return dataclasses.replace(kept, check=Resolution.of(kept, None)) if known else kept
+        return dataclasses.replace(kept, check=Resolution.of(kept)) if known else kept
 
     def _run(self) -> tuple[Solution, tuple[float, ...]]:
         """As `run`, with all distances from the beginning."""

@@ -37,7 +37,6 @@ class CentralPath:
     points: barrier parameters, relative to the mean density of the cost, descending, and paths.
     rows: bounded control points; None to build them anew.
     barrier: slacks and multipliers of the solution, at the points and in the rows; None for none.
-    margins: by which its bounds are tightened at the points: see BoundedAction; None for none.
     near: rows of distances; None to find them anew.
     conditions: multipliers of the conditions at nodes; None for none.
     """
@@ -45,7 +44,6 @@ class CentralPath:
     points: tuple[tuple[float, DiscretePath], ...]
     rows: LimitRows | None
     barrier: Barrier | None = None
-    margins: Array | None = None
     near: ClearanceRows | None = None
     conditions: tuple[Array, ...] | None = None
 

@@ -210,7 +210,7 @@ class BoundedSearch:
         barrier = ended.z if apart else None
         known = None if len(self.problem.passive) > 0 else self.multipliers
         conditions = None if known is None else tuple(known.nodes)
-        return CentralPath(points, self.rows, barrier, self.margins, self.near, conditions)
+        return CentralPath(points, self.rows, barrier, self.near, conditions)
 
     def _add_points(self, ended: Bounded, objective: BoundedAction) -> None:
         """Add the points at which the barrier of a solve was larger to those of earlier solves.

@@ -47,10 +47,10 @@ ROUGH_TOLERANCE = 1e-4
 """Residual of conditions at nodes at which it ends, in [rad] or [m]."""
 ROUGH_ROUNDS = 3
 """Rounds of an augmented Lagrangian for a rough motion."""
-SUBPROBLEM_LEVELS = 3e-4, 1e-2
-"""Barrier parameters at which the subproblems of a motion are joined, relative to the cost's mean
-density, the second where the first one fails: small enough that each stays where it is, and large
-enough for the accelerations at the seams."""
+SUBPROBLEM_LEVEL = 3e-4
+"""Barrier parameter at which the subproblems of a motion are joined, relative to the cost's mean
+density: small enough that each stays where it is, and large enough for the accelerations at the
+seams."""
 SUBPROBLEM_AHEAD = 0.005
 """Distance beyond the least one up to which pairs get rows then, in [m]."""
 DETOUR = 1.05
@@ -99,12 +99,11 @@ def _by_subproblems(search: BoundedSearch, guess: DiscretePath) -> Bounded | Non
             return None
         parts.append(part)
         known.append(part.central_path(ended))
-    for level in SUBPROBLEM_LEVELS if subproblems else ():
-        path = joined(subproblems, [each.at(level)[1] for each in known])
-        ended = _from_subproblems(search, subproblems, parts, path, level)
-        if ended.settled:
-            return ended
-    return None
+    if not subproblems:
+        return None
+    path = joined(subproblems, [each.at(SUBPROBLEM_LEVEL)[1] for each in known])
+    ended = _from_subproblems(search, subproblems, parts, path)
+    return ended if ended.settled else None
 
 
 def _search_of(subproblem: Subproblem, search: BoundedSearch, guess: DiscretePath) -> BoundedSearch:
@@ -120,9 +119,8 @@ def _from_subproblems(
     subproblems: Sequence[Subproblem],
     parts: Sequence[BoundedSearch],
     path: DiscretePath,
-    level: float,
 ) -> Bounded:
-    """The solve of the whole from the joined path at a level, with the subproblems' distances."""
+    """The solve of the whole from the joined path, with the subproblems' distances."""
     near = [
         (subproblem.first, each.near)
         for subproblem, each in zip(subproblems, parts, strict=True)
@@ -131,7 +129,7 @@ def _from_subproblems(
     search.rows, search.near = search.coarse_rows(), search.no_near_rows()
     search.near.take(near)
     search.near.extend(search.problem, path, SUBPROBLEM_AHEAD)
-    return search.solve_at_level(path, level)
+    return search.solve_at_level(path, SUBPROBLEM_LEVEL)
 
 
 def _without_distances(search: BoundedSearch, guess: DiscretePath) -> Bounded:

@@ -8,13 +8,10 @@ import numpy as np
 
 from hovi.discrete.grid import DiscretePath
 from hovi.optimize.barrier import Barrier
-from hovi.optimize.criteria import ROOM, Criteria
 from hovi.optimize.ended import STOPPED, Reason
 from hovi.optimize.start import Start
 from hovi.optimize.trust_region import minimize
 from hovi.planning.clearance.clearance_violation import approach_along
-from hovi.planning.problem.limits import no_limits
-from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.augmented_lagrangian_rounds import first_multipliers
 from hovi.planning.solver.central_path import CentralPath
@@ -37,8 +34,6 @@ NEWTON_SHIFT, NEWTON_STEPS = 0.1, 20
 WARM_BARRIER, WARM_DECREASE = 1e-7, 3e-7
 """Its barrier parameter, and the predicted decrease at which it ends, relative to the cost: the
 cost exceeds its minimum by less than 1e-6."""
-COMPARED = 1e-4, 5e-3
-"""That decrease, and the same as ROOM, where only the cost is wanted."""
 WARM_MARGIN = 1e-6
 """Least distance of its slacks from their bounds."""
 WARM_STEPS = 100
@@ -126,44 +121,19 @@ def _solved_along(search: BoundedSearch, along: CentralPath) -> Bounded:
 
 
 def _adopt(search: BoundedSearch, along: CentralPath) -> None:
-    """Take over the rows, bounds and multipliers of a similar problem on as many intervals."""
+    """Take over the rows and multipliers of a similar problem on as many intervals."""
     if along.rows is not None:
         search.rows = along.rows.copied()
     if along.near is not None and search.near is not None:
         search.near = along.near.on(search.problem)
-    if along.margins is not None and along.margins.shape == search.margins.shape:
-        search.margins = along.margins
     if along.conditions is not None:
         known = first_multipliers(search.problem, along.last)
         if [len(each) for each in known.nodes] == [len(each) for each in along.conditions]:
             search.multipliers = dataclasses.replace(known, nodes=list(along.conditions))
 
 
-def follow(problem: TrajectoryProblem, along: CentralPath, barrier: float) -> CentralPath | None:
-    """The central path of a problem to its solution, as in COMPARED, near that of a similar one.
-
-    None where whole Newton steps do not find the solution, or where time runs out.
-    along: central path of the similar problem, on as many intervals.
-    barrier: last barrier parameter, relative to the mean density of the cost.
-    """
-    limits = problem.limits or no_limits(problem.coordinates)
-    start = Start(along.last, along)
-    search = BoundedSearch(problem, limits, Criteria(barrier=barrier), None, start)
-    _adopt(search, along)
-    ended = _followed(search, along, COMPARED)
-    if ended is None or ended.why is not Reason.STATIONARY:
-        return None
-    return search.central_path(ended)
-
-
-def _followed(
-    search: BoundedSearch, along: CentralPath, enough: tuple[float, float] = (WARM_DECREASE, ROOM)
-) -> Bounded | None:
-    """Follow the solution of a central path by whole Newton steps; None if it is not found so.
-
-    enough: predicted decrease, relative to the cost, and distance of outputs outside their bounds,
-        relative to the range, at which it ends.
-    """
+def _followed(search: BoundedSearch, along: CentralPath) -> Bounded | None:
+    """Follow the solution of a central path by whole Newton steps; None if it is not found so."""
     known = along.barrier
     if known is None or search.near is not None or search.problem.constrained:
         return None
@@ -174,8 +144,7 @@ def _followed(
     criteria = dataclasses.replace(
         search.remaining_criteria(),
         barrier=max(search.criteria.barrier, WARM_BARRIER),
-        enough=enough[0],
-        outside=enough[1],
+        enough=WARM_DECREASE,
         max_iterations=min(NEWTON_STEPS, search.criteria.max_iterations),
     )
     start = Start(moved, dataclasses.replace(known, bounds=objective.bounds))

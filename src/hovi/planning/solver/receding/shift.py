@@ -119,7 +119,7 @@ class Shift:
         return turned(first_state(path), self.problem.coordinates, passed)
 
     def central(self, central: CentralPath) -> CentralPath | None:
-        """The central path of the rest: paths, rows, bounds and multipliers follow.
+        """The central path of the rest: paths, rows and multipliers follow.
 
         None for another duration.
         """
@@ -134,12 +134,10 @@ class Shift:
             return CentralPath(points, None)
         rows, kept = self._remainder.rows(central.rows)
         shifted = CentralPath(points, rows)
-        if central.barrier is None or central.margins is None:
+        if central.barrier is None:
             return shifted
         index = self._outputs(len(central.barrier.s) - central.rows.size, kept)
-        margins = central.margins[:, self._remainder.first :].copy()
-        margins[:, 0] = 0.0  # the start may be at a bound itself
-        return dataclasses.replace(shifted, barrier=central.barrier.of(index), margins=margins)
+        return dataclasses.replace(shifted, barrier=central.barrier.of(index))
 
     def _outputs(self, at_points: int, rows: Index) -> Index:
         """The outputs whose slacks and multipliers those of the rest begin with.
