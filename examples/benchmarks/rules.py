@@ -31,7 +31,7 @@ from pathlib import Path
 import numpy as np
 from measuring import machine, print_table
 from rules_corpus import PROBLEMS, SCREENING
-from rules_list import RULES, Rule
+from rules_list import NOTICED, RULES, Rule
 from switches import replaced, watched
 from threadpoolctl import threadpool_limits
 
@@ -307,7 +307,8 @@ def table_of(corpus: Corpus, rules: Sequence[Rule]) -> None:
             if rule.mechanism != mechanism:
                 continue
             counts = corpus.reached([rule.name])
-            often = f"{len(counts)}: {sum(counts.values()):,}" if counts else "never"
+            often = f"{len(counts)}: {sum(counts.values()):,}" if counts else ""
+            often = "; ".join(filter(None, [often, NOTICED.get(rule.name, "")])) or "never"
             what = f"**{rule.name}** `{rule.where}` {rule.meaning}"
             rows.append([what, often, *corpus.effect([rule.name]).cells()])
         print_table(columns, rows)
@@ -339,7 +340,8 @@ def describe(corpus: Corpus) -> None:
         "than what takes its place. The rest compares problems without the rule: *changed* in any "
         "bit, of those that were tried; *successes* lost (-) and gained (+); *steps* and *points* "
         "as ratios, in parentheses where moved starts spread as much; *costs* that rise or fall "
-        "by more than 1e-4 and twice that spread.\n"
+        "by more than 1e-4 and twice that spread. Where none of them changes, *reached* names "
+        "the test that fails without the rule, or another problem that takes more steps.\n"
     )
 
 

@@ -31,6 +31,22 @@ class Rule:
         return f"{module.removeprefix('hovi.').replace('.', '/')}: {function}"
 
 
+NOTICED = {
+    "another branch clear of links": "test_links_that_would_meet_count_in_the_choice",
+    "held ends": "test_random_poses_are_reached_in_the_cheapest_branch[11]",
+    "few steps where a joint spins": (
+        "test_a_later_grid_that_is_left_unfinished_refutes_an_estimate"
+    ),
+    "few steps where the duration moves": (
+        "test_tightened_bounds_that_take_many_steps_give_way_to_halved_intervals"
+    ),
+    "neighbours are halved, too": "limited reach bravo7_no_ee 2 of side_by_side.py",
+    "halved intervals from the motion": "limited reach bravo7_no_ee 2 of side_by_side.py",
+    "go on where closer": "limited reach bravo7_no_ee 1 of side_by_side.py",
+    "continued at its iteration limit": "limited reach bravo7_no_ee 1 of side_by_side.py",
+}
+"""What notices rules that change nothing on the corpus: a test that fails without, or a problem."""
+
 RULES: list[Rule] = []
 _HERE = ["", ""]
 """Mechanism and module of the rules that follow."""
