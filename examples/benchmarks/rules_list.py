@@ -32,6 +32,7 @@ class Rule:
 
 
 NOTICED = {
+    "search again on the new grid": "test_the_code_of_a_page_runs[from_drake]",
     "another branch clear of links": "test_links_that_would_meet_count_in_the_choice",
     "held ends": "test_random_poses_are_reached_in_the_cheapest_branch[11]",
     "few steps where a joint spins": (
@@ -966,6 +967,13 @@ _rule(
     "Motion and duration are solved for together where that is supported.",
     "joint_minimum",
     "not solves_jointly(problem)",
+    "True",
+)
+_rule(
+    "search again on the new grid",
+    "A search whose duration is not the best on its grid is repeated there.",
+    "best_on_its_grid",
+    "not found.solution.success or is_best(found)",
     "True",
 )
 _at("durations", "planning.solver.free_duration.timed_search")

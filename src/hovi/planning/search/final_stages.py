@@ -196,7 +196,7 @@ class FinalStages:
         """A minimum with its best duration, to the tolerance if there is one."""
         # Here, since most plans have a given duration, and start without these modules.
         from hovi.planning.search.free_to_tolerance import free_to_tolerance
-        from hovi.planning.search.joint_duration import best_duration_by, unless_best
+        from hovi.planning.search.joint_duration import best_on_its_grid
 
         solve_for = self._stretched(self.fine.grid)
         first = dataclasses.replace(solution, problem=on_grid_of(self.fine.problem(), solution))
@@ -204,8 +204,7 @@ class FinalStages:
             first = solve_for(self.fine.grid.duration, solution.trajectory)
         jointly = partial(self._solve_jointly, free)
         if self.fine.tolerance is None:
-            solve = self._stretched(first.trajectory.grid)
-            return unless_best(best_duration_by(free, solve, first, jointly=jointly)).with_time()
+            return best_on_its_grid(free, self._stretched, first, jointly=jointly).with_time()
         refine = partial(self.refined, self.fine.tolerance, f"{which}: ")
         return free_to_tolerance(free, self._stretched, refine, first, jointly)
 

@@ -18,7 +18,7 @@ from hovi.planning.search.joint_duration import (
     NEXT_STRIDE,
     JointSolve,
     OnGrid,
-    best_duration_by,
+    best_on_its_grid,
     is_best,
     unless_best,
 )
@@ -48,7 +48,7 @@ def free_to_tolerance(
     If a later round fails, the motion within the tolerance of the round before is returned, as a
     success only if its duration `is_best`; after an interrupt it counts as none.
     """
-    found = best_duration_by(free, on_grid(first.trajectory.grid), first, jointly=jointly)
+    found = best_on_its_grid(free, on_grid, first, jointly=jointly)
     steps, rounds = found.steps, tuple[Round, ...]()
     kept: BestDuration | None = None
     for number in range(MAX_GRIDS):
@@ -65,8 +65,7 @@ def free_to_tolerance(
         kept = found if refined.accuracy.reached else kept
         if settled or not refined.success:
             break
-        solve = on_grid(refined.trajectory.grid)
-        found = best_duration_by(free, solve, refined, NEXT_STRIDE, jointly)
+        found = best_on_its_grid(free, on_grid, refined, NEXT_STRIDE, jointly)
         steps += found.steps - refined.nit
         if not refined.accuracy.reached or number == MAX_GRIDS - 1:
             found = _measured(found, refined.accuracy)

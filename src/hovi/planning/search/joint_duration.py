@@ -5,6 +5,7 @@ Also whether a duration is the best one: only then is the motion a minimum.
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable
 
 from hovi.discrete.grid import DiscretePath, Grid
@@ -44,6 +45,8 @@ SMALL_WEIGHT, SLOPE_OF_SMALL_WEIGHT = 1e-2, 1e-4
 slope then, relative to J / T: a duration longer by one percent costs less by 1e-6 at most."""
 NEXT_STRIDE = 1.001
 """Ratio of the first two durations of a search that begins near the best one."""
+MAX_SEARCHES = 3
+"""Maximum number of searches, each on the grid of the motion of the one before."""
 _BEST = "The best duration is"
 
 
@@ -98,6 +101,31 @@ def best_duration_by(
         return best_duration(free, solve, first, stride)
     best = BestDuration(free, found, first.nit + found.nit, _ending(free, found) or _BEST)
     return best if found.success else best.unfinished(found.status, ended_search(found.status))
+
+
+def best_on_its_grid(
+    free: FreeDuration,
+    on_grid: OnGrid,
+    first: Solution,
+    stride: float = MAX_STRIDE,
+    jointly: JointSolve | None = None,
+) -> BestDuration:
+    """As `best_duration_by`, but a success `is_best`, and UNRESOLVED if no such duration is found.
+
+    A search that ends elsewhere is repeated from its motion, on the grid of that motion.
+    """
+    found = best_duration_by(free, on_grid(first.trajectory.grid), first, stride, jointly)
+    for _ in range(MAX_SEARCHES - 1):
+        if not found.solution.success or is_best(found):
+            return found
+        solve = on_grid(found.solution.trajectory.grid)
+        again = best_duration_by(free, solve, found.solution, NEXT_STRIDE, jointly)
+        steps = found.steps + again.steps - found.solution.nit
+        if not again.solution.success:
+            found = unless_best(found, again.solution.status)
+            return dataclasses.replace(found, steps=steps)
+        found = dataclasses.replace(again, steps=steps)
+    return unless_best(found)
 
 
 def is_best(found: BestDuration) -> bool:
