@@ -27,7 +27,7 @@ WITH_ORACLES = {
     "optimize/test_banded_model.py",
     "optimize/test_batched_newton.py",
     "optimize/test_bordered_model.py",
-    "optimize/test_constrained_model.py",
+    "optimize/test_kkt_model.py",
     "optimize/test_merge_tree.py",
     "oracles/on_grid.py",
     "planning/conditions/test_derivatives.py",

@@ -243,6 +243,9 @@ for line in sys.stdin:
             os._exit(3)
         if name == "endless":
             os.kill(os.getpid(), 24)
+        if name == "raises":
+            print(json.dumps({"name": name, "success": False, "status": "InputError"}), flush=True)
+            continue
         print(json.dumps({"name": name, "success": True}), flush=True)
     print(json.dumps({"done": True}), flush=True)
 """
@@ -251,14 +254,17 @@ for line in sys.stdin:
 def test_a_problem_in_which_its_process_dies_does_not_end_the_others(
     scripts: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    script = scripts["side_by_side"]
     (tmp_path / "checkout_worker.py").write_text(WORKER)
-    monkeypatch.setattr(scripts["side_by_side"], "HERE", tmp_path)
-    worker = scripts["side_by_side"].Worker(tmp_path, tmp_path / "log")
-    names = ["first", "crashes", "endless", "last"]
+    monkeypatch.setattr(script, "HERE", tmp_path)
+    worker = script.Worker(tmp_path, tmp_path / "log")
+    names = ["first", "crashes", "endless", "raises", "last"]
     try:
         for _ in range(2):
             found = worker.run({"names": names, "limit": 1.0}, 0, {})
-            assert [found[name]["success"] for name in names] == [True, False, False, True]
+            assert [found[name]["success"] for name in names] == [True, False, False, False, True]
+            rows = {name: found[name] for name in names[1:4]}
+            assert script.verdict("limited", rows, rows, bits=True).passes
             assert found["crashes"]["status"] == "crash (3): out of breath"
             assert found["endless"]["status"] == "time-out"
     finally:

@@ -422,14 +422,6 @@ _rule(
     "min(max(FRACTION_TO_BOUNDARY, 1.0 - self.mu / self.scale), LARGEST_FRACTION)",
     "FRACTION_TO_BOUNDARY",
 )
-_at("equations", "optimize.bordered_model")
-_rule(
-    "stiff combinations alone",
-    "Combinations of equations that bounds hold back are left to the penalty.",
-    "EquationModel.factor",
-    "values * self.penalty > LEAST_STIFFNESS",
-    "values > 0.0",
-)
 _at("equations", "optimize.lagrange_newton")
 _rule(
     "second-order corrections",
@@ -444,13 +436,6 @@ _rule(
     "_Search._restore",
     "self.restorations > MAX_RESTORATIONS",
     "True",
-)
-_rule(
-    "loose equations far away",
-    "Far from a minimum linearised equations are solved to 1e-2.",
-    "_Search._step",
-    "min(max(min(self.before, 1.0) ** 2, LEAST_ACCURACY), FIRST_ACCURACY)",
-    "LEAST_ACCURACY",
 )
 _rule(
     "decrease decides where equations hold",
@@ -481,21 +466,6 @@ _rule(
     "max(stuck) >= MAX_STUCK or _at_maximum_penalty(multipliers, first, slow)",
     "_at_maximum_penalty(multipliers, first, slow)",
 )
-_at("equations", "planning.solver.methods.augmented_lagrangian")
-_rule(
-    "polish after rounds",
-    "Eight Newton steps with updated multipliers after the last round.",
-    "AugmentedLagrangian.minimize",
-    "POLISHING_STEPS if status is Status.MINIMUM else 0",
-    "0",
-)
-_rule(
-    "smallest penalty for the polish",
-    "These steps use the smallest penalty with a definite Hessian.",
-    "_polished",
-    "_smallest_penalty(problem, path, known) if steps > 0 else known",
-    "known",
-)
 _at("equations", "planning.solver.methods.lagrange_newton")
 _rule(
     "Lagrange-Newton",
@@ -506,31 +476,24 @@ _rule(
 )
 _rule(
     "one round before Lagrange-Newton",
-    "With equations at nodes alone a rough augmented Lagrangian comes first.",
-    "_Search.run",
-    "multipliers is None and len(problem.passive) == 0",
-    "False",
+    "With equations at nodes alone a rough minimisation with a penalty comes first.",
+    "_minimized",
+    "begin.z is not None or len(objective.problem.passive) > 0",
+    "True",
 )
 _rule(
     "least-squares multipliers of a near guess",
     "A guess near a minimum begins with least-squares multipliers.",
-    "_Search.run",
-    "len(problem.passive) > 0",
-    "False",
-)
-_rule(
-    "rounds where Lagrange-Newton fails",
-    "Rounds of an augmented Lagrangian follow where it diverges.",
-    "_Search.run",
-    "found.why is Reason.DIVERGED",
-    "False",
+    "_minimized",
+    "_multipliers(start, objective)",
+    "None",
 )
 _at("equations", "planning.solver.methods.bounded_search")
 _rule(
     "equations in the steps",
     "Within limits steps satisfy conditions at nodes, instead of rounds.",
     "BoundedSearch.solve",
-    "self._solved_under_conditions(start)",
+    "self._solved_under_equations(start)",
     "None",
     False,
 )

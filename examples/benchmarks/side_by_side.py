@@ -177,7 +177,8 @@ class Worker:
                         rows.setdefault(name, _without_answer(name, answer["lost"]))
                     break
                 else:
-                    rows[answer["name"]] = answer
+                    name, status = answer["name"], str(answer.get("status"))
+                    rows[name] = _without_answer(name, status) | answer
             else:
                 return rows
         raise KeyboardInterrupt

@@ -582,9 +582,21 @@ ENTRIES: dict[str, Entry] = {
     ),
     "band.solve": Entry(
         band.solve,
-        _of_size({"factor": _in("4*p s"), "rhs": _in("k"), "out": _out("k")}),
+        _of_size({"factor": _in("4*p s"), "rhs": _in("k"), "signs": _in("4*p"), "out": _out("k")}),
         _PORTABLE,
+        optional=("signs",),
         **_SOLVE,
+    ),
+    "band.factor_signed": Entry(
+        band.factor_signed,
+        _of_size(
+            {
+                **{"band": _in("4*p s"), "metric": _in("4*p s")},
+                **{"signs": _out("4*p"), "out": _out("4*p s")},
+            }
+        ),
+        {"shift": 0.5, "size": 0, "portable": False},
+        **_BAND,
     ),
     "band.product": Entry(
         band.product, _of_size({"band": _in("4*p s"), "x": _in("k"), "out": _out("k")}), **_SOLVE

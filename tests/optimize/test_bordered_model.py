@@ -10,7 +10,7 @@ import pytest
 from scipy.optimize import minimize
 
 from hovi.optimize.banded_model import BandLayout, BandModel
-from hovi.optimize.bordered_model import Border, BorderedModel, EquationFactor, EquationModel
+from hovi.optimize.bordered_model import Border, BorderedModel
 from hovi.optimize.trust_region import solve_subproblem
 from samples.interval_problems import SIZES, random_problem
 
@@ -120,57 +120,3 @@ def test_the_trust_region_leaves_along_a_concave_last_unknown() -> None:
     change = model.gradient @ trial.step + 0.5 * trial.step @ hessian @ trial.step
     assert -change == pytest.approx(trial.decrease, rel=1e-8)
     assert abs(trial.step[-1]) > 0.1
-
-
-def with_equations(
-    n: int, modes: tuple[int, ...], repeated: bool = False
-) -> tuple[EquationModel, Array, Array]:
-    """A model of an augmented Lagrangian with two equations, its dense Hessian, and A."""
-    problem = random_problem(n, modes, np.ones(len(modes)), 40.0, 0)
-    layout = BandLayout.of(problem.unknowns)
-    band = layout.assemble(problem.nodal.metric[..., None, None] * np.eye(n))
-    rows = np.zeros((2, layout.size))
-    rows[:, :n] = np.random.default_rng(1).normal(size=(2, n))
-    if repeated:
-        rows[1] = 2.0 * rows[0]
-    inner = BandModel(problem.nodal, layout, band)
-    return EquationModel(inner, rows, np.array([0.3, 0.6]), 1e3), problem.hessian, rows
-
-
-@pytest.mark.parametrize(("n", "modes"), [size for size in SIZES if size[0] > 1])
-def test_newton_steps_under_equations_solve_the_kkt_system(n: int, modes: tuple[int, ...]) -> None:
-    model, hessian, rows = with_equations(n, modes)
-    kkt = np.block([[hessian, rows.T], [rows, np.zeros((2, 2))]])
-    expected = np.linalg.solve(kkt, -np.append(model.gradient, model.residual))
-    factor = model.factor(0.0)
-    assert factor is not None
-    step, slope, _ = model.descend(factor)
-    np.testing.assert_allclose(step, expected[:-2], atol=1e-9 * np.abs(expected).max())
-    reaction = model.reaction(model.gradient, factor)
-    assert reaction is not None
-    np.testing.assert_allclose(reaction[0], expected[-2:], rtol=1e-7)
-    # the decrease of the model is minus half the slope, as without equations
-    decrease = -model.gradient @ step - 0.5 * step @ hessian @ step
-    assert -0.5 * slope == pytest.approx(decrease, rel=1e-9)
-    rhs = np.random.default_rng(3).normal(size=len(step))
-    solved = np.linalg.solve(kkt, np.append(rhs, [0.0, 0.0]))[:-2]
-    np.testing.assert_allclose(factor.solve(rhs), solved, atol=1e-9 * np.abs(solved).max())
-
-
-def test_equations_that_repeat_each_other_count_once() -> None:
-    model, _, rows = with_equations(3, (1, 1, 1), repeated=True)
-    factor = model.factor(0.0)
-    assert isinstance(factor, EquationFactor)
-    step, _, _ = model.descend(factor)
-    np.testing.assert_allclose(rows @ step, -model.residual, rtol=1e-9)
-
-
-def test_a_shift_leaves_equations_to_the_penalty() -> None:
-    model, _, _ = with_equations(3, (1, 1, 1))
-    factor = model.factor(0.5)
-    assert factor is not None
-    step, _, _ = model.descend(factor)
-    plain = model.inner.factor(0.5)
-    assert plain is not None
-    np.testing.assert_array_equal(step, model.inner.descend(plain)[0])
-    assert model.reaction(model.gradient, factor) is None

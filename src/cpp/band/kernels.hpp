@@ -12,8 +12,13 @@ struct Kernels {
   bool (*factor)(const Band& shape, const double* band, const double* metric, double shift,
                  double* factor);
 
-  // x = A^-1 x with that L.
-  void (*solve)(const Band& shape, const double* factor, double* x);
+  // L and S of A = L S L^T, without pivoting; S: the signs of the pivots, one for each column of the
+  // panels. False where a pivot is zero or not finite.
+  bool (*factor_signed)(const Band& shape, const double* band, const double* metric, double shift,
+                        double* factor, double* signs);
+
+  // x = A^-1 x with that L, and with S where there are signs.
+  void (*solve)(const Band& shape, const double* factor, const double* signs, double* x);
 
   static const Kernels baseline, avx2;
 };

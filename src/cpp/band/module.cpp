@@ -97,17 +97,33 @@ bool factor(const Input<2>& band, const Input<2>& metric, double shift, const In
   return kernels(portable).factor(shape, band.data(), metric.data(), shift, out.data());
 }
 
+// The number of negative pivots; -1 where there is no factor.
+int factor_signed(const Input<2>& band, const Input<2>& metric, double shift, const Index& rows,
+                  std::size_t size, const Output<1>& signs, const Output<2>& out, bool portable) {
+  const Band shape = shape_of("band", band, rows, size);
+  metric.require("metric", {band.shape(0), band.shape(1)});
+  signs.require("signs", {band.shape(0)});
+  out.require("out", {band.shape(0), band.shape(1)});
+  double* const sign = signs.data();
+  const nb::gil_scoped_release released;
+  std::fill_n(sign, band.shape(0), 1.0);
+  if (!kernels(portable).factor_signed(shape, band.data(), metric.data(), shift, out.data(), sign))
+    return -1;
+  return int(std::count(sign, sign + size, -1.0));
+}
+
 void solve(const Input<2>& factor, const Index& rows, const Input<1>& rhs, const Output<1>& out,
-           bool portable) {
+           bool portable, const std::optional<Input<1>>& signs) {
   rhs.require_kind("rhs");
   const std::size_t size = rhs.shape(0), columns = factor.shape(0);
   const Band shape = shape_of("factor", factor, rows, size);
   out.require("out", {size});
+  const double* const sign = data_or_null("signs", signs, {columns});
   const nb::gil_scoped_release released;
   const auto x = allocate(columns);
   std::copy_n(rhs.data(), size, x.get());
   std::fill_n(x.get() + size, columns - size, 0.0);
-  kernels(portable).solve(shape, factor.data(), x.get());
+  kernels(portable).solve(shape, factor.data(), sign, x.get());
   std::copy_n(x.get(), size, out.data());
 }
 
@@ -132,7 +148,7 @@ std::pair<double, double> descend(const Input<2>& factor, const Index& rows,
   const auto x = allocate(columns), product = allocate(columns);
   for (std::size_t i = 0; i < size; ++i) x.get()[i] = -gradient.data()[i];
   std::fill_n(x.get() + size, columns - size, 0.0);
-  kernels(portable).solve(shape, factor.data(), x.get());
+  kernels(portable).solve(shape, factor.data(), nullptr, x.get());
   std::copy_n(x.get(), size, out.data());
   hovi::band::product(shape, metric.data(), x.get(), product.get());
   return {hovi::band::dot(gradient.data(), x.get(), size),
@@ -147,7 +163,10 @@ NB_MODULE(band, m) {
         "scales"_a.none(), "band"_a);
   m.def("factor", &factor, "band"_a, "metric"_a, "shift"_a, "rows"_a, "size"_a, "out"_a,
         "portable"_a = false);
-  m.def("solve", &solve, "factor"_a, "rows"_a, "rhs"_a, "out"_a, "portable"_a = false);
+  m.def("factor_signed", &factor_signed, "band"_a, "metric"_a, "shift"_a, "rows"_a, "size"_a,
+        "signs"_a, "out"_a, "portable"_a = false);
+  m.def("solve", &solve, "factor"_a, "rows"_a, "rhs"_a, "out"_a, "portable"_a = false,
+        "signs"_a.none() = nb::none());
   m.def("product", &product, "band"_a, "rows"_a, "x"_a, "out"_a);
   m.def("descend", &descend, "factor"_a, "rows"_a, "gradient"_a, "metric"_a, "out"_a,
         "portable"_a = false);

@@ -23,7 +23,24 @@ def factor(
     out: Array,
     portable: bool = False,
 ) -> bool: ...
-def solve(factor: Array, rows: Index, rhs: Array, out: Array, portable: bool = False) -> None: ...
+def factor_signed(
+    band: Array,
+    metric: Array,
+    shift: float,
+    rows: Index,
+    size: int,
+    signs: Array,
+    out: Array,
+    portable: bool = False,
+) -> int: ...
+def solve(
+    factor: Array,
+    rows: Index,
+    rhs: Array,
+    out: Array,
+    portable: bool = False,
+    signs: Array | None = None,
+) -> None: ...
 def product(band: Array, rows: Index, x: Array, out: Array) -> None: ...
 def descend(
     factor: Array,

@@ -87,7 +87,7 @@ class BandLayout:
         size = int(flat.max()) + 1
         j, i = flat[:, :, None], flat[:, None, :]
         lower = (i >= j) & (j >= 0)
-        rows = _rows(flat, size)
+        rows = panel_rows(flat, size)
         stride = max(rows, default=0)
         positions = (j * stride + i - (j - j % PANEL))[lower]
         # where (m, n, m, n), a column and its rows, is stored as (m, m, n, n)
@@ -142,7 +142,7 @@ class BandLayout:
         return band
 
 
-def _rows(unknowns: Index, size: int) -> Index:
+def panel_rows(unknowns: Index, size: int) -> Index:
     """Number of rows of every panel, a multiple of its width; the last rows do not decrease.
 
     unknowns: of every interval, shape (N, m n), -1 where fixed.

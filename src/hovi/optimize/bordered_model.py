@@ -4,10 +4,6 @@ With the model of the other unknowns x, the Hessian is [H b; b^T c] and the metr
 border costs one more solve with the factor of H + shift D: with y = -(H + shift D)^-1 g and
 z = (H + shift D)^-1 b, the step is t = -(g_t + b.y) / p with the pivot p = c + shift d - b.z, and
 x = y - z t. The matrix is positive definite if H + shift D is and p > 0.
-
-Or with a few equations A s = -c, whose multipliers z are the border: of the Newton step, with
-K = H, U = K^-1 A^T and S = A U, they are z = S^-1 (c - U^T g), and s = -K^-1 g - U z.
-[NocedalWright2006, section 16.2]
 """
 
 from __future__ import annotations
@@ -20,11 +16,6 @@ from hovi.optimize.quadratic_model import Factor, QuadraticModel
 from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
-
-LEAST_STIFFNESS = 1e-2
-"""Eigenvalue of S times the penalty below which a combination of equations is left to the penalty.
-It is nearly one where nothing holds the combination back. Where bounds do, steps that satisfy it
-would be cut to nothing, and its multiplier would grow without end."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,96 +115,3 @@ class BorderedModel(QuadraticModel):
     def negative_eigenvalues(self) -> int:
         """Number of negative eigenvalues of the bordered Hessian."""
         return self.inner.negative_eigenvalues((self.border.column, self.border.corner))
-
-
-@dataclass(frozen=True, eq=False)
-class EquationFactor:
-    """A factorisation of H for steps that keep equations: A s = 0.
-
-    inner: of H. rows: A, shape (E, size). solved: U^T, shape (E, size). inverse: of S on what the
-    penalty in H makes stiff, zero on combinations of equations that say nothing, shape (E, E).
-    """
-
-    inner: Factor
-    rows: Array
-    solved: Array
-    inverse: Array
-
-    def solve(self, rhs: Array) -> Array:
-        """The solution of the equations with multipliers for rhs, A s = 0."""
-        s = self.inner.solve(rhs)
-        return s - (self.inverse @ (self.rows @ s)) @ self.solved
-
-    def multipliers(self, gradient: Array, residual: Array) -> Array:
-        """z for a gradient and a residual c, shape (E,)."""
-        return np.asarray(self.inverse @ (residual - self.solved @ gradient))
-
-
-class EquationModel(QuadraticModel):
-    """A banded model of an augmented Lagrangian, whose Newton steps satisfy linearised equations.
-
-    Steps with a shift are those of the model alone, which its penalty leads to the equations.
-    rows: A, shape (E, size). residual: c, shape (E,). penalty: of c^2 / 2 in the model, by which
-    the eigenvalues of S are about 1 / penalty.
-    """
-
-    def __init__(self, inner: BandModel, rows: Array, residual: Array, penalty: float) -> None:
-        self.inner = inner
-        self.rows = rows
-        self.residual = residual
-        self.penalty = penalty
-        self.intervals = inner.intervals
-        self.gradient = inner.gradient
-        self._with_equations: EquationFactor | None = None
-
-    def scatter(self, local: Array) -> Array:
-        """As that of the model alone."""
-        return self.inner.scatter(local)
-
-    def gather(self, s: Array) -> Array:
-        """As that of the model alone."""
-        return self.inner.gather(s)
-
-    def metric_product(self, s: Array) -> Array:
-        """D s."""
-        return self.inner.metric_product(s)
-
-    def factor(self, shift: float) -> Factor | None:
-        """That of H + shift D, with equations for a shift of zero, which is cached."""
-        if shift == 0.0 and self._with_equations is not None:
-            return self._with_equations
-        inner = self.inner.factor(shift)
-        if inner is None or shift != 0.0:
-            return inner
-        solved = np.stack([inner.solve(row) for row in self.rows])
-        values, vectors = np.linalg.eigh(self.rows @ solved.T)
-        stiff = values * self.penalty > LEAST_STIFFNESS
-        some = vectors[:, stiff]
-        inverse = (some / values[stiff]) @ some.T
-        self._with_equations = EquationFactor(inner, self.rows, solved, inverse)
-        return self._with_equations
-
-    def descend(self, factor: Factor) -> tuple[Array, float, float]:
-        """See QuadraticModel.descend; z c is added to the slope, as for a bound of a border."""
-        if not isinstance(factor, EquationFactor):
-            return self.inner.descend(factor)
-        s = factor.inner.solve(-self.gradient)
-        z = factor.multipliers(self.gradient, self.residual)
-        s = s - z @ factor.solved
-        slope = float(self.gradient @ s) + float(z @ self.residual)
-        return s, slope, float(s @ self.metric_product(s))
-
-    def reaction(self, gradient: Array, factor: Factor | None) -> tuple[Array, float] | None:
-        """z of a step for a gradient, and z c; None for a step without equations."""
-        if not isinstance(factor, EquationFactor):
-            return None
-        z = factor.multipliers(gradient, self.residual)
-        return z, float(z @ self.residual)
-
-    def curvature_scale(self) -> float:
-        """That of the model alone."""
-        return self.inner.curvature_scale()
-
-    def negative_eigenvalues(self) -> int:
-        """Number of negative eigenvalues of H, which are those on the tangent space A s = 0."""
-        return self.inner.negative_eigenvalues()

@@ -17,10 +17,9 @@ from typing import Generic, NamedTuple, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from hovi.optimize.constrained_model import ConstrainedModel, EqualityObjective, size_of
 from hovi.optimize.criteria import Criteria
 from hovi.optimize.ended import Ended, Iteration, Outputs, Reason
-from hovi.optimize.quadratic_model import Factor
+from hovi.optimize.kkt_model import EqualityObjective, KktFactor, KktModel, size_of
 from hovi.optimize.restoration import restore
 from hovi.optimize.start import Start
 from hovi.system.deadline import raise_if_late
@@ -51,9 +50,6 @@ LARGE_SLOPE = 1e100
 """Slope above which larger ones make no difference."""
 ROUNDING = 1e-13
 """Relative rounding error of the objective."""
-FIRST_ACCURACY, LEAST_ACCURACY = 1e-2, 1e-10
-"""Accuracy of linearised equations: far from a minimum, and at most; between them the squared
-relative decrease of the last Newton step, so that the last steps converge quadratically."""
 MAX_RESTORATIONS = 4
 """How often the residual is made smaller alone."""
 LAST_DECREASE = 1e-12
@@ -142,37 +138,38 @@ class _Search(Generic[X]):
             if factor is None and not self._restore():
                 return
 
-    def _factor(self, model: ConstrainedModel) -> tuple[Factor | None, float]:
-        """The factor of a definite K with the smallest shift; None where there is none."""
-        factor = model.factor(self.objective.penalty, 0.0)
+    def _factor(self, model: KktModel) -> tuple[KktFactor | None, float]:
+        """The factor with the smallest shift that is definite on A s = 0; None for none."""
+        factor = model.factor(0.0)
         if factor is not None:
             return factor, 0.0
         known = self.shift > 0.0
         shift = SHIFT_DECREASE * self.shift if known else FIRST_SHIFT * model.curvature_scale
         for _ in range(MAX_SHIFTS):
-            factor = model.factor(self.objective.penalty, shift)
+            factor = model.factor(shift)
             if factor is not None:
                 self.shift = shift
                 return factor, shift
             shift *= SHIFT_GROWTH if known else SHIFT_GROWTH**2
         return None, 0.0
 
-    def _step(self, model: ConstrainedModel, factor: Factor, shift: float) -> bool:
+    def _step(self, model: KktModel, factor: KktFactor, shift: float) -> bool:
         """Take a step; whether the iteration ends."""
         ended, c = self.ended, self.ended.outputs.y
-        accuracy = min(max(min(self.before, 1.0) ** 2, LEAST_ACCURACY), FIRST_ACCURACY)
-        step, change = model.solve(factor, self.objective.penalty, c, accuracy)
+        step, change = factor.solve(-model.gradient, -c)
         if not np.isfinite(step).all():
             return not self._restore()
-        curvature = abs(float(step @ model.hessian_product(step)))
+        curvature = abs(model.curvature(step))
         new = ended.z + change
         decrease = 0.5 * curvature + abs(float(new @ c))
         relative = decrease / max(abs(ended.value), 1e-300)
-        settled = relative <= self.criteria.decrease and self.objective.feasible(ended.x)
+        small = relative <= self.criteria.decrease or self._is_short(model, step)
+        settled = small and self.objective.feasible(ended.x)
         if settled and shift > 0.0:  # perhaps a saddle
             ended.why = Reason.STATIONARY
             return True
-        trial = self._search_along(model, factor, step)
+        trial = self._last(model, step) if settled else None
+        trial = trial or self._search_along(model, factor, step)
         value, fraction = (
             (ended.value, 0.0) if trial is None else (trial.outputs.value, trial.fraction)
         )
@@ -186,9 +183,18 @@ class _Search(Generic[X]):
             self.filter.add(ended.value, self.size)
         self._move(trial)
         ended.z = ended.z + trial.fraction * change
-        last = settled and self._is_last(relative)
+        last = settled and (self._is_last(relative) or self._is_short(model, step))
         self.before = relative if shift == 0.0 and trial.fraction == 1.0 else math.inf
         return last and self._at_minimum()
+
+    def _is_short(self, model: KktModel, step: Array) -> bool:
+        """Whether a step is rounding errors, relative to the data; also where nothing is unknown.
+
+        Decreases are compared with the objective, which may be zero.
+        """
+        if not step.size:
+            return True
+        return self.objective.relative_size(self.ended.x, step, model) <= self.criteria.step
 
     def _is_last(self, decrease: float) -> bool:
         """Whether only rounding errors remain after a Newton step of this relative decrease."""
@@ -206,7 +212,14 @@ class _Search(Generic[X]):
         self.ended.outputs = trial.outputs
         self.size = size_of(trial.outputs.y)
 
-    def _search_along(self, model: ConstrainedModel, factor: Factor, step: Array) -> _Trial | None:
+    def _last(self, model: KktModel, step: Array) -> _Trial | None:
+        """The whole step from a stationary point, if only rounding errors change by it."""
+        x = self.objective.retract(self.ended.x, step, model)
+        there, now = self.objective.evaluate(x), self.ended.value
+        same = there.value <= now + ROUNDING * abs(now) and self.objective.feasible(x)
+        return _Trial(x, there, 1.0, True) if same else None
+
+    def _search_along(self, model: KktModel, factor: KktFactor, step: Array) -> _Trial | None:
         """The largest fraction of a step, halved again and again, that the filter accepts."""
         ended = self.ended
         slope = float(model.slope @ step)
@@ -243,14 +256,14 @@ class _Search(Generic[X]):
         return False if smaller else None
 
     def _corrected(
-        self, model: ConstrainedModel, factor: Factor, residual: Array, slope: float
+        self, model: KktModel, factor: KktFactor, residual: Array, slope: float
     ) -> _Trial | None:
         """The whole step with second-order corrections, if it is accepted."""
         ended, total = self.ended, self.ended.outputs.y
         size = size_of(residual)
         for _ in range(MAX_SECOND_ORDER_CORRECTIONS):
             total = total + residual
-            step, _ = model.solve(factor, self.objective.penalty, total, FIRST_ACCURACY)
+            step, _ = factor.solve(-model.gradient, -total)
             x = self.objective.retract(ended.x, step, model)
             there = self.objective.evaluate(x)
             residual = there.y

@@ -12,9 +12,9 @@ from typing import TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from hovi.optimize.constrained_model import ConstrainedModel, EqualityObjective, size_of
 from hovi.optimize.criteria import Criteria
 from hovi.optimize.ended import Ended, Iteration, Reason
+from hovi.optimize.kkt_model import EqualityObjective, KktModel, size_of
 from hovi.optimize.start import Start
 from hovi.system.deadline import raise_if_late
 from hovi.system.interruption import raise_if_interrupted
@@ -50,7 +50,7 @@ def restore(
     ended = Ended(start.x, outputs, none)
     first, damping = size_of(outputs.y), FIRST_DAMPING
     model = objective.model(start.x, none)
-    if not model.normal_band.size:  # without unknowns, nothing changes c
+    if not model.layout.plain.size:  # without unknowns, nothing changes c
         if not objective.feasible(start.x):
             ended.why = Reason.INFEASIBLE
         return ended
@@ -86,22 +86,22 @@ def restore(
     return ended
 
 
-def _is_lowest(
-    objective: EqualityObjective[X], ended: Ended[X, Array], model: ConstrainedModel
-) -> bool:
+def _is_lowest(objective: EqualityObjective[X], ended: Ended[X, Array], model: KktModel) -> bool:
     """Whether |c|^2 has a minimum at a stationary point, by its Hessian A^T A + sum c_i d2 c_i.
 
     The Hessian of f, which the model contains as well, is outweighed.
     """
     weight = OUTWEIGHING * max(model.curvature_scale / model.normal_scale, 1.0)
     there = objective.model(ended.x, weight * ended.outputs.y)
-    return there.factor(weight, FLATNESS * weight * model.normal_scale) is not None
+    shift = FLATNESS * weight * model.normal_scale
+    return there.factor(shift, 1.0 / weight) is not None
 
 
-def _step(model: ConstrainedModel, residual: Array, damping: float) -> tuple[Array, float]:
+def _step(model: KktModel, residual: Array, damping: float) -> tuple[Array, float]:
     """A step and the decrease of |c| that it predicts."""
-    factor = model.normal_factor(damping * model.normal_scale)
-    if factor is None:
+    none = np.zeros(model.layout.plain.size)
+    factor = model.normal_factor(damping * model.normal_scale, 1.0)
+    step, _ = factor.solve(none, -residual)
+    if not np.isfinite(step).all():
         raise ArithmeticError("the Jacobian of the equations has non-finite entries")
-    step = factor.solve(-model.transposed_product(residual))
     return step, size_of(residual) - size_of(residual + model.jacobian_product(step))

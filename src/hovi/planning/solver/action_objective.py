@@ -6,8 +6,9 @@ With equality constraints it is their augmented Lagrangian, see hovi.planning.so
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Callable
-from functools import partial
+from functools import cached_property, partial
 from typing import Literal
 
 import numpy as np
@@ -22,13 +23,15 @@ from hovi.discrete.interval_batch import Coordinates, Jet
 from hovi.discrete.interval_paths import move, move_any
 from hovi.errors import InputError
 from hovi.optimize.banded_model import BandModel
-from hovi.optimize.bordered_model import EquationModel
+from hovi.optimize.equation_model import EquationModel
+from hovi.optimize.kkt_model import KktModel
 from hovi.optimize.merge_tree import MergeTreeModel
 from hovi.optimize.quadratic_model import IntervalSum, QuadraticModel
 from hovi.optimize.trust_region import Objective
 from hovi.planning.conditions.condition import bend_at, linear_at
 from hovi.planning.problem.hessian_structure import ActionStructure
 from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.solver.equations import Equations
 from hovi.planning.solver.multipliers import Multipliers, Residuals, node_residuals
 from hovi.scene.lagrangian import Lagrangian, PointTerms
 
@@ -278,7 +281,7 @@ class ActionObjective(Objective[DiscretePath]):
         """Add the terms of the conditions to the intervals that contain their nodes."""
         rho = known.node_penalty
         for each, mu in zip(self.problem.equations, known.nodes, strict=True):
-            k, columns, scale = self._place(each.where.node)
+            k, columns, scale = self.equations.place(each.where.node)
             q, v = each.where.state(x)
             c, J = linear_at(each, q, v)  # (s,), (s, 2, n)
             force, flat = mu + rho * c, J.reshape(len(c), -1)
@@ -288,41 +291,37 @@ class ActionObjective(Objective[DiscretePath]):
             curvature *= scale[:, None, None, None] * scale[:, None]
             expansion.hessian[k, columns, columns] += curvature.transpose(0, 2, 1, 3)
 
-    def under_conditions(self, x: DiscretePath, model: BandModel) -> EquationModel:
-        """A model at x whose Newton steps satisfy the conditions at nodes to first order."""
-        assert self.multipliers is not None
-        rows, residuals = [], []
-        for each in self.problem.equations:
-            k, columns, scale = self._place(each.where.node)
-            c, J = linear_at(each, *each.where.state(x))
-            local = np.zeros(model.intervals.gradient.shape)
-            for slope in J:
-                local[k, columns] = slope * scale[:, None]
-                rows.append(model.scatter(local))
-            residuals.append(c)
-        penalty = self.multipliers.node_penalty
-        return EquationModel(model, np.stack(rows), np.concatenate(residuals), penalty)
+    def under_equations(self, x: DiscretePath, model: BandModel) -> EquationModel:
+        """The last model, at x, whose Newton steps satisfy the equations to first order."""
+        known, equations = self.multipliers, self.equations
+        assert known is not None
+        rows = equations.rows(x, self.expansion)
+        layout, wide = equations.layout(rows)
+        none, bands = np.zeros(len(layout.multipliers)), (self.structure.metric_band, wide)
+        kkt = KktModel(model.intervals, rows, none, layout, *bands)
+        penalty = known.torque_penalty if len(self.problem.passive) > 0 else known.node_penalty
+        return EquationModel(model, kkt, equations.residual(x, self.outputs(x)), penalty)
+
+    @cached_property
+    def equations(self) -> Equations:
+        """The equations, with one penalty for all."""
+        known = self.multipliers
+        assert known is not None
+        both = len(self.problem.passive) > 0
+        scale = math.sqrt(known.node_penalty / known.torque_penalty) if both else 1.0
+        return Equations(self.problem, scale)
 
     def hold(self, x: DiscretePath, change: Array) -> float:
-        """Add a change to the multipliers of conditions; returns what it adds to the value at x."""
-        known, first = self.multipliers, 0
+        """Add a change to the multipliers of equations; returns what it adds to the value at x."""
+        known = self.multipliers
         assert known is not None
-        nodes, residuals = [], node_residuals(self.problem, x)
-        for mu in known.nodes:
-            nodes.append(mu + change[first : first + len(mu)])
-            first += len(mu)
-        self.multipliers = dataclasses.replace(known, nodes=nodes)
-        return float(change @ np.concatenate(residuals))
-
-    def node_error(self, x: DiscretePath) -> float:
-        """The largest residual of a condition at a node, in [rad] or [m]."""
-        return max(float(np.abs(c).max()) for c in node_residuals(self.problem, x))
-
-    def _place(self, node: int) -> tuple[int, slice, Array]:
-        """An interval that contains a node, the columns of its (q, h v), and their scales."""
-        k = min(node, self.problem.grid.intervals - 1)
-        first = 0 if node == k else self.ld.k
-        return k, slice(first, first + 2), np.array([1.0, 1.0 / self.problem.grid.steps[k]])
+        passive, (torque, nodes) = self.problem.passive, self.equations.split(change)
+        forces = [force.copy() for force in known.torque]
+        for force, more in zip(forces, torque, strict=False):  # none without passive joints
+            force[:, passive] += more
+        added = [mu + more for mu, more in zip(known.nodes, nodes, strict=True)]
+        self.multipliers = dataclasses.replace(known, torque=forces, nodes=added)
+        return float(change @ self.equations.residual(x, self.outputs(x)))
 
     def retract(self, x: DiscretePath, step: Array, model: QuadraticModel) -> DiscretePath:
         """The path moved by a step: nodes by `integrate`, everything else added."""

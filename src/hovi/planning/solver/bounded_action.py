@@ -24,6 +24,7 @@ from hovi.planning.conditions.function import Points
 from hovi.planning.problem.limits import Limits, limited_columns
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.action_objective import ActionObjective, LinearAlgebra
+from hovi.planning.solver.augmented_lagrangian_rounds import within
 from hovi.planning.solver.limits.limit_rows import LimitRows, push_rows
 from hovi.planning.solver.multipliers import Multipliers
 from hovi.planning.solver.point_outputs import PointOutputs
@@ -45,11 +46,12 @@ class BoundedAction(BoundedObjective[DiscretePath]):
     algebra, multipliers: as for ActionObjective.
     more: further outputs.
     rows: control points, bounded instead of values at the points and refined in place; or None.
-    node_tolerance: largest residual of a condition at a node, in [rad] or [m], where steps satisfy
-        these conditions and their multipliers follow; None where the multipliers stay.
+    tolerances: where steps satisfy equations and their multipliers follow, those of passive
+        torques, relative to the largest torque, and of conditions at nodes, in [rad] or [m]; None
+        where the multipliers stay.
     """
 
-    node_tolerance: float | None = None
+    tolerances: tuple[float, float] | None = None
 
     def __init__(
         self,
@@ -143,13 +145,13 @@ class BoundedAction(BoundedObjective[DiscretePath]):
             terms = self._with_more(x, terms, sigma_at, rho_at, multipliers_at)
             curvatures = self._with_torque_weights(curvatures)
         model = self.action.model_with(x, curvatures, terms, self._row_terms(sigma, rho))
-        return self._under_conditions(x, model)
+        return self._under_equations(x, model)
 
-    def _under_conditions(self, x: DiscretePath, model: QuadraticModel) -> QuadraticModel:
-        """The model, whose steps satisfy conditions at nodes to first order if they are to."""
-        if self.node_tolerance is None or not isinstance(model, BandModel):
+    def _under_equations(self, x: DiscretePath, model: QuadraticModel) -> QuadraticModel:
+        """The model, whose steps satisfy equations to first order if they are to."""
+        if self.tolerances is None or not isinstance(model, BandModel):
             return model
-        return self.action.under_conditions(x, model)
+        return self.action.under_equations(x, model)
 
     def _row_terms(self, sigma: Array, rho: Array) -> Callable[[Expansion], None] | None:
         """What adds the terms of the rows to an expansion; None without rows."""
@@ -290,14 +292,14 @@ class BoundedAction(BoundedObjective[DiscretePath]):
         self._predicted = self.action.predicted_slopes(model.gather(step))
 
     def hold(self, x: DiscretePath, change: Array) -> float:
-        """See BoundedObjective.hold: of conditions at nodes."""
+        """See BoundedObjective.hold."""
         return self.action.hold(x, change)
 
     def satisfies_equations(self, x: DiscretePath) -> bool:
-        """Whether conditions at nodes hold to their tolerance."""
-        if self.node_tolerance is None:
+        """Whether equations hold to their tolerances."""
+        if self.tolerances is None:
             return True
-        return self.action.node_error(x) <= self.node_tolerance
+        return within(self.action.residuals(x), *self.tolerances)
 
     def refine(self, x: DiscretePath, level: float) -> Refinement | None:
         """Bound more control points of the motion: see LimitRows."""

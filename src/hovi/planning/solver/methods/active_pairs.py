@@ -22,7 +22,7 @@ from hovi.planning.problem.contradictions import contradiction
 from hovi.planning.problem.limits import no_limits
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.answer import Answer
-from hovi.planning.solver.methods.augmented_lagrangian import AugmentedLagrangian
+from hovi.planning.solver.methods.lagrange_newton import LagrangeNewton
 from hovi.planning.solver.methods.method import Guess, Method, Report
 from hovi.planning.solver.methods.trust_region import TrustRegion
 from hovi.planning.solver.status import Status, unfinished
@@ -35,7 +35,7 @@ Index = npt.NDArray[np.intp]
 FIRST_BEYOND = 0.002
 """Distance beyond the margin, in [m], up to which pairs along a guess are bounded at once:
 those that touch the margin along the motion of a similar problem."""
-WITHOUT_LIMITS: tuple[Method, ...] = (TrustRegion(), AugmentedLagrangian())
+WITHOUT_LIMITS: tuple[Method, ...] = (TrustRegion(), LagrangeNewton())
 """Methods for a problem without limits of which no pair is near another."""
 
 

@@ -12,9 +12,9 @@ from hovi.discrete.grid import DiscretePath
 from hovi.discrete.instants import Instants
 from hovi.optimize.banded_model import BandModel
 from hovi.optimize.barrier import INITIAL_MARGIN, WARM_START_MARGIN, Barrier
-from hovi.optimize.bordered_model import EquationModel
 from hovi.optimize.criteria import Criteria
 from hovi.optimize.ended import Ended, Iteration, Reason
+from hovi.optimize.equation_model import EquationModel
 from hovi.optimize.interior_point import minimize_bounded
 from hovi.optimize.merge_tree import MergeTreeModel
 from hovi.optimize.nearby_bounded import follow_bounded
@@ -34,6 +34,7 @@ from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.action_objective import LinearAlgebra
 from hovi.planning.solver.augmented_lagrangian_rounds import (
     NODE_TOLERANCE,
+    TORQUE_TOLERANCE,
     first_multipliers,
     minimize_constrained,
     spurious_sentence,
@@ -178,14 +179,14 @@ class BoundedSearch:
         self,
         known: Multipliers | None,
         algebra: LinearAlgebra | None = None,
-        node_tolerance: float | None = None,
+        tolerances: tuple[float, float] | None = None,
     ) -> BoundedAction:
         """The action with the tightened bounds.
 
-        known: multipliers of the constraints. node_tolerance: see BoundedAction.
+        known: multipliers of the constraints. tolerances: see BoundedAction.
         """
         objective = self._objective(known, algebra)
-        objective.node_tolerance = node_tolerance
+        objective.tolerances = tolerances
         return objective
 
     def _objective(self, known: Multipliers | None, algebra: LinearAlgebra | None) -> BoundedAction:
@@ -240,7 +241,7 @@ class BoundedSearch:
         if not self.problem.constrained:
             return self.minimized(self.objective(None), start, self.remaining_criteria())
         if len(self.problem.passive) == 0:
-            found = self._solved_under_conditions(start)
+            found = self._solved_under_equations(start)
             if found is not None:
                 return found
 
@@ -292,10 +293,10 @@ class BoundedSearch:
         z = Barrier.central(objective.bounds, outputs.y, level * density, scale, margin)
         return Start(path, z)
 
-    def _solved_under_conditions(self, start: Begun) -> Bounded | None:
+    def _solved_under_equations(self, start: Begun) -> Bounded | None:
         """A solve whose steps satisfy the conditions at nodes; None where that fails."""
         known = self.multipliers or first_multipliers(self.problem, start.x)
-        objective = self.objective(known, node_tolerance=NODE_TOLERANCE)
+        objective = self.objective(known, tolerances=(TORQUE_TOLERANCE, NODE_TOLERANCE))
         ended = self.minimized(objective, start, self.remaining_criteria())
         satisfied = objective.satisfies_equations(ended.x)
         if ended.why is Reason.DIVERGED or (ended.why is Reason.STATIONARY and not satisfied):

@@ -18,9 +18,6 @@ def all_methods() -> Iterator[Method]:
     from hovi.planning.solver.methods.lagrange_newton import LagrangeNewton
 
     yield LagrangeNewton()
-    from hovi.planning.solver.methods.augmented_lagrangian import AugmentedLagrangian
-
-    yield AugmentedLagrangian()
     from hovi.planning.solver.methods.interior_point import InteriorPoint
 
     yield InteriorPoint()

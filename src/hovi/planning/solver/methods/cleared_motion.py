@@ -230,7 +230,7 @@ def _rough(
         decrease=ROUGH_DECREASE,
         max_iterations=min(most, whole.max_iterations),
     )
-    tolerance = None if known is None or len(search.problem.passive) > 0 else ROUGH_TOLERANCE
-    objective = search.objective(known, node_tolerance=tolerance)
+    steps = known is not None and len(search.problem.passive) == 0
+    objective = search.objective(known, tolerances=(np.inf, ROUGH_TOLERANCE) if steps else None)
     start = Start(path) if mu is None else search.start_at(path, mu, objective)
     return search.minimized(objective, start, criteria), objective.action.multipliers

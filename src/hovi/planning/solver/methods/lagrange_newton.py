@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
-from dataclasses import field
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from hovi.discrete.grid import DiscretePath
 from hovi.optimize.criteria import Criteria
-from hovi.optimize.ended import Ended, Iteration, Reason
+from hovi.optimize.ended import Ended, Reason
 from hovi.optimize.lagrange_newton import minimize_under_equations
 from hovi.optimize.start import Start
 from hovi.optimize.trust_region import minimize
@@ -21,36 +21,26 @@ from hovi.planning.solver.augmented_lagrangian_rounds import (
     FEASIBLE_RESIDUAL,
     FIRST_DECREASE,
     WARM_TORQUE_FRACTION,
+    are_met,
     first_multipliers,
     spurious_sentence,
     unmet_sentence,
     within,
 )
 from hovi.planning.solver.constrained_action import ConstrainedAction
-from hovi.planning.solver.methods.augmented_lagrangian import (
-    AugmentedLagrangian,
-    constrained_status,
-    with_offset,
-)
 from hovi.planning.solver.methods.method import Guess, Method, Report
 from hovi.planning.solver.outcome.cost_with_time import price_of_time
-from hovi.system.dataclass import dataclass
+from hovi.planning.solver.status import Status, status_of
 from hovi.system.deadline import Deadline, OutOfTimeError
 
 Array = npt.NDArray[np.float64]
 
-PENALTY_FACTORS = 1.0, 1e2, 1e4
-"""Factors of the penalty with which negative eigenvalues are counted; the least counts."""
-
-NEAR_ACCURACY = 1e-2
-"""Accuracy of the linearised equations in the step that shows whether a minimum is near."""
-
 
 class LagrangeNewton(Method):
-    """Newton's method on the KKT equations; rounds of an augmented Lagrangian where it fails.
+    """Newton's method on the KKT equations.
 
-    With equations at nodes alone, such as frame goals, one such round leads from the guess to its
-    neighbourhood: the cost decides there, and a trust region suits it.
+    With equations at nodes alone, such as frame goals, a minimisation with a penalty leads from the
+    guess to its neighbourhood: the cost decides there, and a trust region suits it.
     """
 
     def supports(self, problem: TrajectoryProblem) -> bool:
@@ -65,119 +55,115 @@ class LagrangeNewton(Method):
         report: Report | None = None,
     ) -> Answer:
         """See Method.minimize."""
-        rounds = AugmentedLagrangian()
         if problem.unreachable:
-            return rounds.minimize(problem, start, criteria, report)
-        search = _Search(problem, criteria, report)
-        found = search.run(start.x, start.near)
-        if found is not None:
-            return found
-        result = rounds.minimize(problem, start, search.left, search.report)
-        history = [*search.history, *result.history]
-        said, meant = (f"after {count} steps" for count in (result.nit, len(history)))
-        message = result.message.replace(said, meant)
-        return dataclasses.replace(result, nit=len(history), history=history, message=message)
+            said = f"{problem.unreachable}."
+            return Answer.at(problem, start.x, Status.INFEASIBLE, said)
+        objective = ConstrainedAction(problem, start.x)
+        return _answer(objective, _minimized(objective, start, criteria, report))
 
 
-@dataclass(eq=False)
-class _Search:
-    """A search from a guess, and the history of its steps."""
+def _minimized(
+    objective: ConstrainedAction, start: Guess, criteria: Criteria, report: Report | None
+) -> Ended[DiscretePath, Array]:
+    """The end of Newton's method, with the steps that led to where it began."""
+    deadline, begin = Deadline(criteria.time_limit), Start(start.x, _multipliers(start, objective))
+    if begin.z is not None or len(objective.problem.passive) > 0:
+        return minimize_under_equations(objective, begin, criteria, report)
+    first, known = _with_penalty(objective, start, criteria, report)
+    if first.why is Reason.STATIONARY:
+        left = dataclasses.replace(criteria, time_limit=deadline.seconds_left)
+        on_step = _with_offset(report, len(first.steps))
+        found = minimize_under_equations(objective, Start(first.x, known), left, on_step)
+    else:
+        there = objective.evaluate(first.x)
+        found = Ended(first.x, there, np.zeros_like(there.y), first.why)
+    found.steps, found.saddles = first.steps + found.steps, first.saddles
+    return found
 
-    problem: TrajectoryProblem
-    criteria: Criteria
-    on_step: Report | None
-    history: list[Iteration] = field(default_factory=list)
 
-    def __post_init__(self) -> None:
-        self.deadline = Deadline(self.criteria.time_limit)
+def _answer(objective: ConstrainedAction, found: Ended[DiscretePath, Array]) -> Answer:
+    """The answer of a solve, whether it ended in a minimum or not."""
+    problem, x, nit = objective.problem, found.x, len(found.steps)
+    n_neg = _negative_eigenvalues(objective, found)
+    residuals = objective.action.residuals(x)
+    cost = found.value + price_of_time(problem)
+    satisfied = within(residuals, FEASIBLE_RESIDUAL, FEASIBLE_RESIDUAL)
+    done = found.why is Reason.STATIONARY or (found.why is Reason.ITERATION_LIMIT and satisfied)
+    reason = spurious_sentence(problem, x) if done else ""
+    if found.why is Reason.INFEASIBLE:
+        reason = unmet_sentence(problem, x, residuals)
+    status, message = _status(problem, found, reason, cost, nit, n_neg)
+    forces, jets = objective.multipliers(found.z).forces, objective.action.jets(x)
+    return Answer(problem, x, cost, status, message, nit, n_neg, found.steps, forces, jets=jets)
 
-    @property
-    def left(self) -> Criteria:
-        """The criteria with the time that is left."""
-        return dataclasses.replace(self.criteria, time_limit=self.deadline.seconds_left)
 
-    @property
-    def report(self) -> Report | None:
-        """The report, with step numbers that continue."""
-        return with_offset(self.on_step, len(self.history))
+def _multipliers(start: Guess, objective: ConstrainedAction) -> Array | None:
+    """Least-squares multipliers at a path, which are those of a near minimum up to its distance.
 
-    def run(self, path: DiscretePath, near: bool) -> Answer | None:
-        """The result; None where the method fails. near: whether the path is near a solution."""
-        problem = self.problem
-        multipliers = None
-        saddles: list[float] = []
-        objective = ConstrainedAction(problem, path)
-        if near or len(problem.passive) > 0:
-            multipliers = self._known(path, objective)
-        if multipliers is None and len(problem.passive) == 0:
-            first, multipliers = self._first_round(path, objective)
-            path, saddles = first.x, first.saddles
-            if first.why is Reason.DIVERGED:
-                return None
-            if first.why is not Reason.STATIONARY:
-                there = objective.evaluate(path)
-                early = Ended(path, there, np.zeros_like(there.y), first.why, saddles=saddles)
-                return self._result(objective, early, -1)
-        start = Start(path, multipliers)
-        found = minimize_under_equations(objective, start, self.left, self.report)
-        self.history += found.steps
-        found.saddles = saddles
-        if found.why is Reason.DIVERGED:
-            return None
-        return self._result(objective, found, _negative_eigenvalues(objective, found))
+    None where passive torques are large, and with equations at nodes where no minimum is near.
+    """
+    path, problem = start.x, objective.problem
+    if not start.near and len(problem.passive) == 0:
+        return None
+    if objective.action.residuals(path).torque_fraction > WARM_TORQUE_FRACTION:
+        return None
+    there = objective.evaluate(path)
+    known = objective.model(path, np.zeros_like(there.y)).least_squares_multipliers()
+    if len(problem.passive) > 0:
+        return known
+    model = objective.model(path, known)
+    factor = model.factor(0.0)
+    if factor is None:
+        return None
+    step, _ = factor.solve(-model.gradient, -there.y)
+    decrease = 0.5 * abs(model.curvature(step))
+    return known if decrease <= FIRST_DECREASE * abs(there.value) else None
 
-    def _known(self, path: DiscretePath, objective: ConstrainedAction) -> Array | None:
-        """Least-squares multipliers at a path near a minimum; None if it is not near one.
 
-        They are those of the minimum up to the path's distance from it.
-        """
-        if objective.action.residuals(path).torque_fraction > WARM_TORQUE_FRACTION:
-            return None
-        there = objective.evaluate(path)
-        model = objective.model(path, np.zeros_like(there.y))
-        multipliers = model.least_squares_multipliers()
-        if len(self.problem.passive) > 0:
-            return multipliers
-        model = objective.model(path, multipliers)
-        factor = model.factor(objective.penalty, 0.0)
-        if factor is None:
-            return None
-        step, _ = model.solve(factor, objective.penalty, there.y, NEAR_ACCURACY)
-        decrease = 0.5 * abs(float(step @ model.hessian_product(step)))
-        return multipliers if decrease <= FIRST_DECREASE * abs(there.value) else None
+def _with_penalty(
+    objective: ConstrainedAction, start: Guess, criteria: Criteria, report: Report | None
+) -> tuple[Ended[DiscretePath, None], Array]:
+    """A motion near a minimum, where equations at nodes hold nearly, and its multipliers."""
+    problem = objective.problem
+    known = dataclasses.replace(
+        first_multipliers(problem, start.x), node_penalty=objective.node_penalty
+    )
+    penalized = ActionObjective(problem, multipliers=known)
+    rough = dataclasses.replace(criteria, decrease=FIRST_DECREASE)
+    ended = minimize(penalized, Start(start.x), rough, report)
+    updated = known.updated(penalized.residuals(ended.x), problem.passive)
+    return ended, objective.of_nodes(updated)
 
-    def _first_round(
-        self, path: DiscretePath, objective: ConstrainedAction
-    ) -> tuple[Ended[DiscretePath, None], Array]:
-        """A motion near a minimum, where equations at nodes hold nearly, and its multipliers."""
-        known = dataclasses.replace(
-            first_multipliers(self.problem, path), node_penalty=objective.node_penalty
-        )
-        penalized = ActionObjective(self.problem, multipliers=known)
-        criteria = dataclasses.replace(self.left, decrease=FIRST_DECREASE)
-        ended = minimize(penalized, Start(path), criteria, self.report)
-        self.history += ended.steps
-        updated = known.updated(penalized.residuals(ended.x), self.problem.passive)
-        return ended, objective.of_nodes(updated)
 
-    def _result(
-        self, objective: ConstrainedAction, found: Ended[DiscretePath, Array], n_neg: int
-    ) -> Answer:
-        """The result of a solve, whether it ended in a minimum or not."""
-        problem, x, nit = self.problem, found.x, len(self.history)
-        known = objective.multipliers(found.z)
-        residuals = objective.action.residuals(x)
-        cost = found.value + price_of_time(problem)
-        satisfied = within(residuals, FEASIBLE_RESIDUAL, FEASIBLE_RESIDUAL)
-        done = found.why is Reason.STATIONARY or (found.why is Reason.ITERATION_LIMIT and satisfied)
-        reason = spurious_sentence(problem, x) if done else ""
-        if found.why is Reason.INFEASIBLE:
-            reason = unmet_sentence(problem, x, residuals)
-        status, message = constrained_status(problem, found, reason, cost, nit, n_neg)
-        forces, jets = known.forces, objective.action.jets(x)
-        return Answer(
-            problem, x, cost, status, message, nit, n_neg, self.history, forces, jets=jets
-        )
+def _with_offset(report: Report | None, done: int) -> Report | None:
+    """A report whose step numbers continue from earlier ones."""
+    if report is None:
+        return None
+    return lambda step, cost: report(done + step, cost)
+
+
+def _status(
+    problem: TrajectoryProblem,
+    ended: Ended[DiscretePath, Any],
+    reason: str,
+    cost: float,
+    nit: int,
+    n_neg: int,
+) -> tuple[Status, str]:
+    """Status and message; INFEASIBLE for a reason why the constraints cannot be satisfied.
+
+    Other arguments as of `status_of`.
+    """
+    if reason and np.isfinite(cost):
+        return Status.INFEASIBLE, f"{reason}."
+    status, message = status_of(problem, ended, cost, nit, n_neg)
+    if status is Status.MINIMUM:
+        return status, message
+    residuals = ActionObjective(problem).residuals(ended.x)
+    if are_met(residuals):
+        return status, message
+    sentence = unmet_sentence(problem, ended.x, residuals)
+    return status, f"{message} So far, {sentence.partition(';')[0]}."
 
 
 def _negative_eigenvalues(objective: ConstrainedAction, found: Ended[DiscretePath, Array]) -> int:
@@ -185,10 +171,6 @@ def _negative_eigenvalues(objective: ConstrainedAction, found: Ended[DiscretePat
     if found.convex:
         return 0
     try:
-        model = objective.model(found.x, found.z)
-        if model.factor(objective.penalty, 0.0) is not None:
-            return 0
-        counts = [model.negative_eigenvalues(objective.penalty * f) for f in PENALTY_FACTORS]
-        return min(counts)
+        return objective.model(found.x, found.z).negative_eigenvalues()
     except OutOfTimeError:
         return -1

@@ -122,7 +122,7 @@ class ClearedAction(BoundedAction):
             return None
         other.add_at_instants(other.curvature - near.curvature, self.action.expansion.hessian)
         self._near = other
-        return self._under_conditions(x, self.action.model_of_expansion())
+        return self._under_equations(x, self.action.model_of_expansion())
 
     def _row_terms(self, sigma: Array, rho: Array) -> Callable[[Expansion], None] | None:
         """What adds the terms of all rows to an expansion."""

@@ -1,0 +1,372 @@
+"""The quadratic model of a Lagrangian f + y.c under linearised equations c, as one band matrix.
+
+The equations of an interval contain its own columns alone. Their multipliers follow its last
+unknown in the order of elimination, so that the KKT matrix
+
+    [H + shift D, A^T; A, -delta I]
+
+is a band matrix like H. It is factored as L S L^T with signs S, without pivoting: H + shift D is
+positive definite on the tangent space A s = 0 exactly where as many signs are negative as there are
+equations. A small delta makes equations harmless that depend on each other; refinement removes it
+from the solutions. [NocedalWright2006, section 16.2; Vanderbei1995]
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from functools import cached_property
+from typing import Generic, Self, TypeVar
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi._native import band as native
+from hovi.optimize.banded_model import PANEL, BandLayout, BandModel, Runs, panel_rows
+from hovi.optimize.ended import Outputs
+from hovi.optimize.quadratic_model import IntervalSum
+from hovi.system.dataclass import dataclass
+
+Array = npt.NDArray[np.float64]
+Index = npt.NDArray[np.intp]
+X = TypeVar("X")
+
+DELTA = 1e-8
+"""delta, relative to |A|^2 / |H|."""
+MAX_REFINEMENTS = 4
+"""Maximum number of refinements of a solution."""
+CONTRACTION = 0.1
+"""Ratio of successive residuals above which refinement has reached rounding errors."""
+
+
+@dataclass(frozen=True, eq=False)
+class ConstraintRows:
+    """Jacobian of E constraints of each of B intervals, in their first columns.
+
+    index: of the intervals. slopes: shape (B, E, m, n).
+    """
+
+    index: Index | slice
+    slopes: Array
+
+    @cached_property
+    def flat(self) -> Array:
+        """The slopes with one column per component, shape (B, E, m n)."""
+        return self.slopes.reshape(*self.slopes.shape[:2], -1)
+
+    def weighted(self, y: Array) -> Array:
+        """A^T y in the columns of the intervals, shape (B, m, n)."""
+        B, E, m, n = self.slopes.shape
+        return np.asarray(np.matmul(y.reshape(B, 1, E), self.flat).reshape(B, m, n))
+
+    @property
+    def size(self) -> int:
+        """B E."""
+        intervals, rows = self.slopes.shape[:2]
+        return int(intervals * rows)
+
+
+@dataclass(frozen=True, eq=False)
+class KktLayout:
+    """Where unknowns and multipliers are in the KKT matrix.
+
+    plain: of H. stride, profile: of the band, as BandLayout has them in `shape` and `rows`.
+    unknowns, multipliers: their numbers in the matrix.
+    hessian, slopes: which entries of the intervals' Hessians and of every ConstraintRows enter the
+    band, and where.
+    """
+
+    plain: BandLayout
+    profile: Index
+    unknowns: Index
+    multipliers: Index
+    hessian: Runs
+    slopes: list[Runs]
+
+    @classmethod
+    def of(cls, plain: BandLayout, rows: Sequence[ConstraintRows]) -> Self:
+        """The layout for equations of the intervals that some rows have."""
+        N, _, n = plain.unknowns.shape
+        flat = plain.unknowns.reshape(N, -1)
+        index = [np.repeat(np.arange(N)[x.index], x.slopes.shape[1]) for x in rows]
+        # every unknown, and after it the equations whose last unknown it is
+        last = flat.max(axis=1)[np.concatenate(index)]
+        keys = np.concatenate([2 * np.arange(plain.size), 2 * last + 1])
+        numbers = np.empty(len(keys), dtype=np.intp)
+        numbers[np.argsort(keys, kind="stable")] = np.arange(len(keys))
+        unknowns, multipliers = numbers[: plain.size], numbers[plain.size :]
+        moved = np.append(unknowns, -1)[flat]
+        ends = np.cumsum([0, *map(len, index)])
+        own = [multipliers[a:b] for a, b in itertools.pairwise(ends)]
+        profile = _profile(moved, index, own, len(keys))
+        stride = int(profile.max())
+        entries, positions, scales = plain.runs.unrolled()
+        j, i = np.divmod(positions, plain.shape[1])
+        i += j - j % PANEL
+        hessian = Runs.of(entries, _position(unknowns[i], unknowns[j], stride), scales)
+        slopes = []
+        for each, at, intervals in zip(rows, own, index, strict=True):
+            columns = moved[intervals, : each.flat.shape[2]]
+            free = columns >= 0
+            scale = None
+            if plain.scales is not None:
+                scale = np.repeat(plain.scales, n, axis=1)[intervals, : columns.shape[1]][free]
+            places = _position(np.broadcast_to(at[:, None], columns.shape), columns, stride)[free]
+            slopes.append(Runs.of(np.flatnonzero(free), places, scale))
+        return cls(plain, profile, unknowns, multipliers, hessian, slopes)
+
+    @property
+    def size(self) -> int:
+        """Number of unknowns and multipliers."""
+        return len(self.unknowns) + len(self.multipliers)
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Of the band."""
+        return PANEL * len(self.profile), int(self.profile.max())
+
+    def matrix(self, hessian: Array | None, rows: Sequence[ConstraintRows]) -> Array:
+        """The band of [H, A^T; A, 0]; hessian: of the intervals, (N, m, m, n, n), 0 for None."""
+        band = np.zeros(self.shape) if hessian is None else self._band(hessian, self.hessian)
+        for each, runs in zip(rows, self.slopes, strict=True):
+            band += self._band(each.slopes[..., None], runs)
+        return band
+
+    def _band(self, numbers: Array, runs: Runs) -> Array:
+        band = np.empty(self.shape)
+        numbers = np.ascontiguousarray(numbers)
+        native.assemble(numbers, runs.starts, runs.positions, runs.lengths, runs.scales, band)
+        return band
+
+    def extended(self, band: Array) -> Array:
+        """A band of the unknowns as one of the matrix, zero for multipliers."""
+        wide, columns = np.zeros(self.shape), np.arange(self.plain.size)
+        i = (columns - columns % PANEL)[:, None] + np.arange(band.shape[1])
+        inside = (i >= columns[:, None]) & (i < self.plain.size)
+        j = np.broadcast_to(columns[:, None], i.shape)[inside]
+        numbers = band[: len(columns)][inside]
+        some = numbers != 0.0
+        i, j = self.unknowns[i[inside][some]], self.unknowns[j[some]]
+        wide.ravel()[_position(i, j, self.shape[1])] = numbers[some]
+        return wide
+
+    @cached_property
+    def corners(self) -> Index:
+        """Places of the multipliers' diagonal entries in the band, flat."""
+        return _position(self.multipliers, self.multipliers, self.shape[1])
+
+
+def _position(i: Index, j: Index, stride: int) -> Index:
+    """Place of entry (i, j), i >= j, in a band: see BandLayout.assemble."""
+    return np.asarray(j * stride + i - (j - j % PANEL))
+
+
+def _profile(moved: Index, index: list[Index], own: list[Index], size: int) -> Index:
+    """Number of rows of every panel of the KKT matrix: see BandLayout.
+
+    moved: numbers of the unknowns of every interval, (N, m n), -1 where fixed. index, own: interval
+    and number of every equation.
+    """
+    count = np.bincount(np.concatenate(index), minlength=len(moved))
+    columns = np.full((len(moved), moved.shape[1] + int(count.max(initial=0))), -1)
+    columns[:, : moved.shape[1]] = moved
+    intervals, numbers = np.concatenate(index), np.concatenate(own)
+    order = np.argsort(intervals, kind="stable")
+    first = np.cumsum(count) - count
+    place = np.arange(len(order)) - first[intervals[order]]
+    columns[intervals[order], moved.shape[1] + place] = numbers[order]
+    return panel_rows(columns, size)
+
+
+class KktFactor:
+    """L S L^T of [H + shift D, A^T; A, -delta I].
+
+    negative: number of negative signs. exact: whether delta belongs to the system to solve.
+    """
+
+    def __init__(
+        self, layout: KktLayout, matrix: Array, metric: Array, shift: float, exact: bool
+    ) -> None:
+        self.layout, self.matrix, self.metric, self.shift = layout, matrix, metric, shift
+        self.delta = 0.0 if exact else -float(matrix.ravel()[layout.corners[0]])
+        self.factor, self.signs = np.empty_like(matrix), np.ones(len(matrix))
+        out = layout.profile, layout.size, self.signs, self.factor
+        self.negative: int = native.factor_signed(matrix, metric, shift, *out)
+
+    def solve(self, force: Array, target: Array) -> tuple[Array, Array]:
+        """(s, z) of (H + shift D) s + A^T z = force, A s = target, refined to delta = 0."""
+        at = self.layout
+        rhs = np.empty(at.size)
+        rhs[at.unknowns], rhs[at.multipliers] = force, target
+        x = self._solved(rhs)
+        size = np.inf
+        for _ in range(MAX_REFINEMENTS if self.delta else 0):
+            residual = rhs - self._product(x)
+            before, size = size, float(np.linalg.norm(residual))
+            if not size <= CONTRACTION * before:
+                break
+            x = x + self._solved(residual)
+        return x[at.unknowns], x[at.multipliers]
+
+    def _solved(self, rhs: Array) -> Array:
+        x = np.empty_like(rhs)
+        native.solve(self.factor, self.layout.profile, rhs, x, signs=self.signs)
+        return x
+
+    def _product(self, x: Array) -> Array:
+        """The product with the matrix for delta = 0."""
+        product, shifted = np.empty_like(x), np.empty_like(x)
+        rows, at = self.layout.profile, self.layout.multipliers
+        native.product(self.matrix, rows, x, product)
+        product[at] += self.delta * x[at]
+        if self.shift:
+            native.product(self.metric, rows, x, shifted)
+            product += self.shift * shifted
+        return product
+
+
+class KktModel:
+    """The gradient of f, the Hessian H of f + y.c, the Jacobian A of c, and the metric D.
+
+    slope: gradient of f. gradient: of f + y.c. metric: D as `KktLayout.extended` has it.
+    """
+
+    def __init__(
+        self,
+        intervals: IntervalSum,
+        rows: Sequence[ConstraintRows],
+        multipliers: Array,
+        layout: KktLayout,
+        metric_band: Array,
+        metric: Array,
+    ) -> None:
+        self.rows, self.layout, self.metric = rows, layout, metric
+        self.plain = BandModel(intervals, layout.plain, metric_band)
+        self.slope = self.plain.gradient
+        self.gradient = self.slope + self.transposed_product(multipliers)
+
+    @property
+    def equations(self) -> int:
+        """Number of equations."""
+        return len(self.layout.multipliers)
+
+    @cached_property
+    def _matrix(self) -> Array:
+        return self.layout.matrix(self.plain.intervals.hessian, self.rows)
+
+    @cached_property
+    def _rows_alone(self) -> Array:
+        return self.layout.matrix(None, self.rows)
+
+    @cached_property
+    def normal_scale(self) -> float:
+        """Magnitude of A^T A relative to D."""
+        return self._largest_slope**2 / float(np.max(np.abs(self.metric), initial=1e-300))
+
+    @property
+    def curvature_scale(self) -> float:
+        """Magnitude of H relative to D."""
+        return self.plain.curvature_scale()
+
+    @cached_property
+    def _largest_slope(self) -> float:
+        return max(float(np.max(np.abs(each.slopes), initial=0.0)) for each in self.rows)
+
+    @cached_property
+    def _delta(self) -> float:
+        largest = float(np.max(np.abs(self.plain.intervals.hessian), initial=0.0))
+        return (DELTA * self._largest_slope**2 / largest if largest else 0.0) or DELTA
+
+    def factor(self, shift: float, delta: float | None = None) -> KktFactor | None:
+        """The factor; None where H + shift D is not positive definite on A s = 0.
+
+        delta: as a part of the system to solve; a small one, which refinement removes, if None.
+        """
+        factor = self._factored(self._matrix, shift, delta)
+        return factor if factor.negative == self.equations else None
+
+    def normal_factor(self, damping: float, delta: float | None = None) -> KktFactor:
+        """As `factor`, with damping D in place of H + shift D."""
+        return self._factored(self._rows_alone, damping, delta)
+
+    def _factored(self, band: Array, shift: float, delta: float | None) -> KktFactor:
+        matrix = band.copy()
+        matrix.ravel()[self.layout.corners] = -(self._delta if delta is None else delta)
+        return KktFactor(self.layout, matrix, self.metric, shift, delta is not None)
+
+    def negative_eigenvalues(self) -> int:
+        """Number of negative eigenvalues of H on the tangent space A s = 0; -1 if undecided.
+
+        Those of the KKT matrix less the number of equations: see [Gould1985]. Two values of delta
+        have to agree.
+        """
+        counts = {self._factored(self._matrix, 0.0, d * self._delta).negative for d in (1.0, 1e-2)}
+        count = counts.pop()
+        return -1 if counts or count < 0 else count - self.equations
+
+    def jacobian_product(self, s: Array) -> Array:
+        """A s."""
+        columns = self.plain.gather(s)
+        parts = []
+        for rows in self.rows:
+            own = columns[rows.index, : rows.slopes.shape[2]]
+            parts.append(np.matmul(rows.flat, own.reshape(len(own), -1, 1)).ravel())
+        return np.concatenate(parts)
+
+    def transposed_product(self, y: Array) -> Array:
+        """A^T y."""
+        columns = np.zeros(self.plain.intervals.gradient.shape)
+        first = 0
+        for rows in self.rows:
+            last = first + rows.size
+            columns[rows.index, : rows.slopes.shape[2]] += rows.weighted(y[first:last])
+            first = last
+        return self.plain.scatter(columns)
+
+    def curvature(self, s: Array) -> float:
+        """s.H s."""
+        x, product = np.zeros(self.layout.size), np.empty(self.layout.size)
+        x[self.layout.unknowns] = s
+        native.product(self._matrix, self.layout.profile, x, product)
+        return float(x @ product)
+
+    def length(self, s: Array) -> float:
+        """|s| in the metric."""
+        return math.sqrt(max(float(np.vdot(s, self.plain.metric_product(s))), 0.0))
+
+    def least_squares_multipliers(self) -> Array:
+        """The change of y that makes the gradient smallest, in the norm of D^-1."""
+        return self.normal_factor(1.0).solve(-self.gradient, np.zeros(self.equations))[1]
+
+
+def size_of(c: Array) -> float:
+    """|c|; infinite where it is not finite or too large to be squared."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        square = float(np.dot(c, c))
+    return math.sqrt(square) if math.isfinite(square) else math.inf
+
+
+class EqualityObjective(ABC, Generic[X]):
+    """An objective f under equations c = 0, on a manifold."""
+
+    @abstractmethod
+    def evaluate(self, x: X) -> Outputs:
+        """f and c at x; not finite where they are not defined."""
+
+    @abstractmethod
+    def feasible(self, x: X) -> bool:
+        """Whether c = 0 holds at x to its tolerances."""
+
+    @abstractmethod
+    def model(self, x: X, multipliers: Array) -> KktModel:
+        """The second-order model of f + y.c at x."""
+
+    @abstractmethod
+    def retract(self, x: X, step: Array, model: KktModel) -> X:
+        """The point that a step of a model leads to."""
+
+    @abstractmethod
+    def relative_size(self, x: X, step: Array, model: KktModel) -> float:
+        """The largest component of a step relative to the size of the data."""

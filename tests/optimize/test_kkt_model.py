@@ -1,0 +1,228 @@
+"""The KKT matrix in a band, against dense linear algebra."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import scipy.linalg
+
+from hovi._native import band as native
+from hovi.optimize.banded_model import BandLayout
+from hovi.optimize.equation_model import SOFTNESS, EquationFactor, EquationModel
+from hovi.optimize.kkt_model import ConstraintRows, KktLayout, KktModel
+from hovi.optimize.quadratic_model import IntervalSum
+
+Array = np.ndarray
+N, M, DOF = 6, 5, 2
+
+
+def layout(unequal: bool, periodic: bool) -> BandLayout:
+    """Nodes with two columns and one inner mode; end nodes fixed, or one node."""
+    nodes = np.full((N + 1, 2, DOF), -1)
+    inner = np.zeros((N, 1, DOF), dtype=np.intp)
+    count = 0
+    for k in range(N + 1):
+        if 0 < k < N or (periodic and k == 0):
+            nodes[k] = count + np.arange(2 * DOF).reshape(2, DOF)
+            count += 2 * DOF
+        if k < N:
+            inner[k] = count + np.arange(DOF)
+            count += DOF
+    if periodic:
+        nodes[N] = nodes[0]
+    unknowns = np.concatenate([nodes[:-1], nodes[1:], inner], axis=1)
+    scales = np.ones((N, M))
+    scales[:, [1, 3]] = np.linspace(0.5, 2.0, N)[:, None]
+    return BandLayout.of(unknowns, scales if unequal else None)
+
+
+def model(
+    unequal: bool = True,
+    periodic: bool = False,
+    curvature: float = 0.0,
+    repeated: bool = False,
+    seed: int = 3,
+) -> KktModel:
+    """A random model; one equation per interval, a second one in two of them."""
+    rng = np.random.default_rng(seed)
+    roots = rng.standard_normal((N, M * DOF, M * DOF))
+    hessian = np.matmul(roots, roots.transpose(0, 2, 1)) + curvature * np.eye(M * DOF)
+    blocks = hessian.reshape(N, M, DOF, M, DOF).transpose(0, 1, 3, 2, 4).copy()
+    metric = np.broadcast_to(np.eye(M), (N, M, M)).copy()
+    plan = layout(unequal, periodic)
+    metric_band = plan.assemble(metric[..., None, None] * np.eye(DOF))
+    rows = [
+        ConstraintRows(slice(None), rng.standard_normal((N, 1, M, DOF))),
+        ConstraintRows(np.array([1, 4]), rng.standard_normal((2, 1, 4, DOF))),
+    ]
+    rows += rows[1:] if repeated else []
+    intervals = IntervalSum(rng.standard_normal((N, M, DOF)), blocks, metric)
+    y = rng.standard_normal(sum(each.size for each in rows))
+    wide = KktLayout.of(plan, rows)
+    return KktModel(intervals, rows, y, wide, metric_band, wide.extended(metric_band))
+
+
+def dense(of: KktModel) -> tuple[Array, Array, Array]:
+    """H, A and D, column by column of the intervals."""
+    units = np.eye(len(of.gradient))
+    A = np.stack([of.jacobian_product(e) for e in units], axis=1)
+    D = np.stack([of.plain.metric_product(e) for e in units], axis=1)
+    columns = np.stack([of.plain.gather(e) for e in units])
+    H = np.einsum("xkai,kabij,ykbj->xy", columns, of.plain.intervals.hessian, columns)
+    return H, A, D
+
+
+CASES = pytest.mark.parametrize(
+    ("unequal", "periodic"), [(False, False), (True, False), (True, True)]
+)
+
+
+@CASES
+def test_products_with_the_jacobian_are_transposed(unequal: bool, periodic: bool) -> None:
+    of = model(unequal, periodic)
+    _, A, _ = dense(of)
+    y = np.random.default_rng(0).standard_normal(len(A))
+    np.testing.assert_allclose(of.transposed_product(y), A.T @ y, rtol=1e-12, atol=1e-12)
+
+
+@CASES
+@pytest.mark.parametrize("shift", [0.0, 0.5])
+@pytest.mark.parametrize("delta", [None, 0.3])
+def test_a_step_solves_the_kkt_equations(
+    unequal: bool, periodic: bool, shift: float, delta: float | None
+) -> None:
+    of = model(unequal, periodic)
+    H, A, D = dense(of)
+    rng = np.random.default_rng(2)
+    force, target = rng.standard_normal(len(H)), rng.standard_normal(len(A))
+    factor = of.factor(shift, delta)
+    assert factor is not None
+    s, z = factor.solve(force, target)
+    kkt = np.block([[H + shift * D, A.T], [A, -(delta or 0.0) * np.eye(len(A))]])
+    expected = np.linalg.solve(kkt, np.concatenate([force, target]))
+    np.testing.assert_allclose(np.concatenate([s, z]), expected, rtol=0, atol=1e-9)
+    assert of.curvature(s) == pytest.approx(s @ H @ s, rel=1e-10)
+
+
+@pytest.mark.parametrize("damping", [1e-6, 0.1])
+def test_equations_alone_are_damped(damping: float) -> None:
+    """A Gauss-Newton step -(A^T A + damping D)^-1 A^T c."""
+    of = model()
+    H, A, D = dense(of)
+    c = np.random.default_rng(1).standard_normal(len(A))
+    s, _ = of.normal_factor(damping, 1.0).solve(np.zeros(len(H)), -c)
+    np.testing.assert_allclose(s, -np.linalg.solve(A.T @ A + damping * D, A.T @ c), atol=1e-8)
+
+
+@pytest.mark.parametrize("unequal", [False, True])
+def test_equations_may_be_stated_twice(unequal: bool) -> None:
+    """The step is the same; the multipliers are not unique."""
+    of = model(unequal, repeated=True)
+    H, A, _ = dense(of)
+    c = A @ np.random.default_rng(2).standard_normal(len(H))
+    factor = of.factor(0.0)
+    assert factor is not None
+    s, z = factor.solve(-of.gradient, -c)
+    np.testing.assert_allclose(A @ s, -c, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(H @ s + A.T @ z, -of.gradient, rtol=0, atol=1e-8)
+    kkt = np.block([[H, A.T], [A, np.zeros((len(A), len(A)))]])
+    expected = np.linalg.lstsq(kkt, np.concatenate([-of.gradient, -c]), rcond=None)[0]
+    np.testing.assert_allclose(s, expected[: len(H)], rtol=0, atol=1e-8)
+
+
+@CASES
+@pytest.mark.parametrize("repeated", [False, True])
+def test_signs_count_the_negative_eigenvalues_of_the_tangent_space(
+    unequal: bool, periodic: bool, repeated: bool
+) -> None:
+    found = set()
+    for curvature in (0.0, -3.0, -6.0, -8.0, -12.0):
+        of = model(unequal, periodic, curvature, repeated, seed=5)
+        H, A, _ = dense(of)
+        Z = scipy.linalg.null_space(A)
+        tangent = int(np.sum(np.linalg.eigvalsh(Z.T @ H @ Z) < 0))
+        assert of.negative_eigenvalues() == tangent
+        assert (of.factor(0.0) is not None) == (tangent == 0)
+        found.add(tangent)
+    assert len(found) > 3
+
+
+def test_least_squares_multipliers_make_the_gradient_small() -> None:
+    of = model()
+    _, A, D = dense(of)
+    z = of.least_squares_multipliers()
+    root = scipy.linalg.sqrtm(np.linalg.inv(D)).real
+    expected = np.linalg.lstsq(root @ A.T, -root @ of.gradient, rcond=None)[0]
+    np.testing.assert_allclose(z, expected, rtol=0, atol=1e-8 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("portable", [False, True])
+def test_a_matrix_without_a_pivot_has_no_factor(portable: bool) -> None:
+    rows, out = np.array([4]), np.zeros((4, 4))
+    for matrix in (np.zeros((4, 4)), np.full((4, 4), np.nan)):
+        signs = np.zeros(4)
+        none = np.zeros((4, 4))
+        assert native.factor_signed(matrix, none, 0.0, rows, 4, signs, out, portable) == -1
+
+
+def under_equations(
+    penalty: float = 1e3, repeated: bool = False, curvature: float = 0.0
+) -> tuple[EquationModel, Array, Array]:
+    """A model whose Newton steps satisfy equations, its dense Hessian, and A."""
+    of = model(repeated=repeated, curvature=curvature)
+    H, A, _ = dense(of)
+    c = A @ np.random.default_rng(2).standard_normal(len(H))
+    return EquationModel(of.plain, of, c, penalty), H, A
+
+
+def test_newton_steps_under_equations_solve_the_softened_kkt_system() -> None:
+    steps, H, A = under_equations()
+    delta = SOFTNESS / 1e3
+    kkt = np.block([[H, A.T], [A, -delta * np.eye(len(A))]])
+    s, z = np.split(
+        np.linalg.solve(kkt, -np.append(steps.gradient, steps.residual)), [len(steps.gradient)]
+    )
+    factor = steps.factor(0.0)
+    assert factor is not None
+    step, slope, length = steps.descend(factor)
+    np.testing.assert_allclose(step, s, atol=1e-9 * np.abs(s).max())
+    assert length == pytest.approx(step @ steps.metric_product(step), rel=1e-10)
+    reaction = steps.reaction(steps.gradient, factor)
+    assert reaction is not None
+    np.testing.assert_allclose(reaction[0], z, rtol=1e-7)
+    assert reaction[1] == pytest.approx(z @ steps.residual, rel=1e-7)
+    # the decrease of the model is minus half the slope, as without equations
+    decrease = -steps.gradient @ step - 0.5 * step @ H @ step
+    assert -0.5 * slope == pytest.approx(decrease, rel=1e-9)
+    rhs = np.random.default_rng(3).normal(size=len(step))
+    solved = np.linalg.solve(kkt, np.append(rhs, np.zeros(len(A))))[: len(step)]
+    np.testing.assert_allclose(factor.solve(rhs), solved, atol=1e-9 * np.abs(solved).max())
+
+
+def test_equations_that_repeat_each_other_are_satisfied() -> None:
+    steps, _, A = under_equations(1e9, repeated=True)
+    factor = steps.factor(0.0)
+    assert isinstance(factor, EquationFactor)
+    step, _, _ = steps.descend(factor)
+    np.testing.assert_allclose(A @ step, -steps.residual, rtol=0, atol=1e-9)
+
+
+def test_a_shift_leaves_equations_to_the_penalty() -> None:
+    steps, _, _ = under_equations()
+    factor = steps.factor(0.5)
+    assert factor is not None
+    step, _, _ = steps.descend(factor)
+    plain = steps.inner.factor(0.5)
+    assert plain is not None
+    np.testing.assert_array_equal(step, steps.inner.descend(plain)[0])
+    assert steps.reaction(steps.gradient, factor) is None
+
+
+def test_curvature_across_equations_alone_needs_to_be_positive() -> None:
+    """What is negative along their normals does not matter."""
+    for curvature in (-3.0, -6.0, -8.0, -12.0):
+        steps, H, A = under_equations(curvature=curvature)
+        Z = scipy.linalg.null_space(A)
+        tangent = int(np.sum(np.linalg.eigvalsh(Z.T @ H @ Z) < 0))
+        assert steps.negative_eigenvalues() == tangent
+        assert (steps.factor(0.0) is not None) == (tangent == 0)
