@@ -88,13 +88,6 @@ _rule(
     "False",
 )
 _rule(
-    "settle slowly",
-    "Newton steps that shrink by less than 0.7 are the last, by rounding.",
-    "_is_last",
-    "SLOWEST * before",
-    "math.inf",
-)
-_rule(
     "stationary by size",
     "A step that is small relative to the data ends a solve whose decrease is not small.",
     "_is_stationary",
@@ -812,13 +805,6 @@ _rule(
     "True",
 )
 _at("limits", "planning.solver.limits.graded_parts")
-_rule(
-    "short parts at ends",
-    "Parts next to a given end near a bound are halved.",
-    "graded",
-    "ends is not None",
-    "False",
-)
 _rule(
     "short parts where led back",
     "Parts across the end of a way back are short.",

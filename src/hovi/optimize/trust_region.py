@@ -39,9 +39,8 @@ EXACT_MODEL_DECREASE = 1e-5
 """Relative decrease of a Newton step below which models are exact, if Criteria.exact."""
 SIZE_TEST_LENGTH = 1e-4
 """Step length, relative to the first radius, up to which the relative size is evaluated."""
-LAST_DECREASE, SLOWEST = 1e-14, 0.7
-"""Relative predicted decrease below which an exact Newton step is the last in any case, and ratio
-of successive ones above which steps do not converge."""
+LAST_DECREASE = 1e-14
+"""Relative predicted decrease below which an exact Newton step is the last in any case."""
 STALLED_STEPS = 5
 """Number of steps that Criteria.stalled compares."""
 
@@ -198,16 +197,15 @@ def _is_last(
 ) -> bool:
     """Whether the Newton step from a stationary point is accurate enough to be the last one.
 
-    The decrease that remains after it is decrease^3 / before^2 by quadratic convergence; where
-    there is no convergence, rounding dominates. See Criteria.exact.
+    The decrease that remains after it is decrease^3 / before^2 by quadratic convergence. See
+    Criteria.exact.
     exact: whether the model is exact. before: predicted decrease of the previous step, infinite
         if that was not a Newton step.
     """
     size, decrease = abs(ended.value), trial.decrease
     if not criteria.exact or not exact:
         return not criteria.exact
-    most = min(criteria.decrease * size, SLOWEST * before)
-    if decrease <= LAST_DECREASE * size or decrease > most:
+    if decrease <= LAST_DECREASE * size or decrease > criteria.decrease * size:
         return True
     return before < math.inf and decrease * (decrease / before) ** 2 <= REMAINING_DECREASE * size
 

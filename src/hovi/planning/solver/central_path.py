@@ -12,7 +12,6 @@ from hovi.discrete.grid import DiscretePath, Grid
 from hovi.discrete.guess import stretched
 from hovi.optimize.barrier import Barrier
 from hovi.planning.problem.problem import TrajectoryProblem
-from hovi.planning.solver.limits.graded_parts import GivenEnds
 from hovi.planning.solver.limits.limit_rows import LimitRows
 from hovi.planning.solver.near.clearance_rows import ClearanceRows
 from hovi.robot.space.coordinates import Coordinates
@@ -117,7 +116,7 @@ class CentralPath:
             return CentralPath(self.points, None)
         if problem.limits is None:
             return self
-        rows, kept = self.rows.between(problem.limits, GivenEnds.of(problem))
+        rows, kept = self.rows.between(problem.limits)
         if rows is self.rows:
             return self
         barrier = self.barrier

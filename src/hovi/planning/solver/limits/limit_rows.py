@@ -26,7 +26,7 @@ from hovi.optimize.bounded_objective import Refinement
 from hovi.planning.conditions.joint_quantity import DERIVATIVES
 from hovi.planning.problem.limits import Limits
 from hovi.planning.problem.way_back.excused import Excused
-from hovi.planning.solver.limits.graded_parts import GivenEnds, graded
+from hovi.planning.solver.limits.graded_parts import graded
 from hovi.planning.solver.limits.limited_coordinates import LimitedCoordinates
 from hovi.planning.solver.limits.limited_parts import LimitedParts
 from hovi.robot.space.configuration_space import ConfigurationSpace
@@ -82,7 +82,6 @@ class LimitRows:
         free_ends: Mask | None = None,
         halvings: tuple[int, int] = (0, 0),
         barrier: float = 0.0,
-        ends: GivenEnds | None = None,
     ) -> None:
         self.grid = grid
         self.space = space
@@ -95,7 +94,7 @@ class LimitRows:
         self.of = LimitedCoordinates.of(limits, grid, space)
         depth = np.where(self.of.order == 0, *halvings)
         halved = LimitedParts.halved(grid.intervals, depth)
-        self.parts = graded(halved, grid, limits, self.of, ends)
+        self.parts = graded(halved, grid, limits, self.of)
         self._set(self._rows_of(self.parts))
 
     def copied(self) -> LimitRows:
@@ -144,12 +143,12 @@ class LimitRows:
         rows.fixed = True
         return rows
 
-    def between(self, limits: Limits, ends: GivenEnds) -> tuple[LimitRows, Index]:
+    def between(self, limits: Limits) -> tuple[LimitRows, Index]:
         """The rows of a motion between other ends, and those at their places; or -1.
 
         limits: which may excuse another start.
         """
-        parts = graded(self.parts, self.grid, limits, self.of, ends)
+        parts = graded(self.parts, self.grid, limits, self.of)
         if limits.excused == self.limits.excused and len(parts) == len(self.parts):
             return self, np.arange(self.size)
         rows = self.copied()

@@ -43,7 +43,6 @@ from hovi.planning.solver.bounded_action import BoundedAction
 from hovi.planning.solver.central_path import CentralPath
 from hovi.planning.solver.clearance_outputs import EXTRA_CLEARANCE, ClearanceOutputs
 from hovi.planning.solver.condition_outputs import ConditionOutputs
-from hovi.planning.solver.limits.graded_parts import GivenEnds
 from hovi.planning.solver.limits.limit_rows import LimitRows
 from hovi.planning.solver.limits.row_forces import forces_of, joined
 from hovi.planning.solver.methods.method import Guess, Report
@@ -162,7 +161,7 @@ class BoundedSearch:
 
     def _rows(self, halvings: tuple[int, int]) -> LimitRows:
         problem, limits, barrier = self.problem, self.limits, self.criteria.barrier
-        ends = problem.free_ends, halvings, barrier, GivenEnds.of(problem)
+        ends = problem.free_ends, halvings, barrier
         return LimitRows(problem.grid, limits, problem.coordinates.curved_space, *ends)
 
     def no_near_rows(self) -> ClearanceRows:
