@@ -72,7 +72,7 @@ class ConstraintRows:
 class KktLayout:
     """Where unknowns and multipliers are in the KKT matrix.
 
-    plain: of H. stride, profile: of the band, as BandLayout has them in `shape` and `rows`.
+    plain: of H. profile: number of rows of every panel of the band, as BandLayout has them.
     unknowns, multipliers: their numbers in the matrix.
     hessian, slopes: which entries of the intervals' Hessians and of every ConstraintRows enter the
     band, and where.
@@ -183,14 +183,15 @@ def _profile(moved: Index, index: list[Index], own: list[Index], size: int) -> I
 class KktFactor:
     """L S L^T of [H + shift D, A^T; A, -delta I].
 
-    negative: number of negative signs. exact: whether delta belongs to the system to solve.
+    negative: number of negative signs; -1 where there is no factor. delta: what refinement removes,
+    0 where delta belongs to the system to solve.
     """
 
     def __init__(
-        self, layout: KktLayout, matrix: Array, metric: Array, shift: float, exact: bool
+        self, layout: KktLayout, matrix: Array, metric: Array, shift: float, delta: float
     ) -> None:
         self.layout, self.matrix, self.metric, self.shift = layout, matrix, metric, shift
-        self.delta = 0.0 if exact else -float(matrix.ravel()[layout.corners[0]])
+        self.delta = delta
         self.factor, self.signs = np.empty_like(matrix), np.ones(len(matrix))
         out = layout.profile, layout.size, self.signs, self.factor
         self.negative: int = native.factor_signed(matrix, metric, shift, *out)
@@ -277,7 +278,8 @@ class KktModel:
     @cached_property
     def _delta(self) -> float:
         largest = float(np.max(np.abs(self.plain.intervals.hessian), initial=0.0))
-        return (DELTA * self._largest_slope**2 / largest if largest else 0.0) or DELTA
+        scale = self._largest_slope**2 / largest if largest > 0.0 else 0.0
+        return DELTA * (scale or 1.0)
 
     def factor(self, shift: float, delta: float | None = None) -> KktFactor | None:
         """The factor; None where H + shift D is not positive definite on A s = 0.
@@ -292,9 +294,9 @@ class KktModel:
         return self._factored(self._rows_alone, damping, delta)
 
     def _factored(self, band: Array, shift: float, delta: float | None) -> KktFactor:
-        matrix = band.copy()
-        matrix.ravel()[self.layout.corners] = -(self._delta if delta is None else delta)
-        return KktFactor(self.layout, matrix, self.metric, shift, delta is not None)
+        matrix, removed = band.copy(), self._delta if delta is None else 0.0
+        matrix.ravel()[self.layout.corners] = -(removed if delta is None else delta)
+        return KktFactor(self.layout, matrix, self.metric, shift, removed)
 
     def negative_eigenvalues(self) -> int:
         """Number of negative eigenvalues of H on the tangent space A s = 0; -1 if undecided.
