@@ -35,10 +35,6 @@ X = TypeVar("X")
 
 DELTA = 1e-8
 """delta, relative to |A|^2 / |H|."""
-MAX_REFINEMENTS = 4
-"""Maximum number of refinements of a solution."""
-CONTRACTION = 0.1
-"""Ratio of successive residuals above which refinement has reached rounding errors."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -197,18 +193,16 @@ class KktFactor:
         self.negative: int = native.factor_signed(matrix, metric, shift, *out)
 
     def solve(self, force: Array, target: Array) -> tuple[Array, Array]:
-        """(s, z) of (H + shift D) s + A^T z = force, A s = target, refined to delta = 0."""
+        """(s, z) of (H + shift D) s + A^T z = force, A s = target.
+
+        One refinement removes delta, down to rounding errors.
+        """
         at = self.layout
         rhs = np.empty(at.size)
         rhs[at.unknowns], rhs[at.multipliers] = force, target
         x = self._solved(rhs)
-        size = np.inf
-        for _ in range(MAX_REFINEMENTS if self.delta else 0):
-            residual = rhs - self._product(x)
-            before, size = size, float(np.linalg.norm(residual))
-            if not size <= CONTRACTION * before:
-                break
-            x = x + self._solved(residual)
+        if self.delta > 0.0:
+            x = x + self._solved(rhs - self._product(x))
         return x[at.unknowns], x[at.multipliers]
 
     def _solved(self, rhs: Array) -> Array:
