@@ -130,6 +130,37 @@ def test_equations_may_be_stated_twice(unequal: bool) -> None:
     np.testing.assert_allclose(s, expected[: len(H)], rtol=0, atol=1e-8)
 
 
+@pytest.mark.parametrize("repeated", [False, True])
+@pytest.mark.parametrize("seed", range(5))
+def test_a_hessian_that_is_singular_off_the_tangent_space_has_a_factor(
+    seed: int, repeated: bool
+) -> None:
+    """Equations alone determine every second unknown."""
+    of = model(repeated=repeated, seed=seed)
+    rng = np.random.default_rng(seed)
+    rows = [ConstraintRows(slice(None), rng.standard_normal((N, 3, M, DOF)))]
+    rows *= 2 if repeated else 1
+    bases = rng.standard_normal((N, M, M, DOF))
+    bases[..., 1] = 0.0
+    intervals = of.plain.intervals
+    hessian = np.einsum("kria,krjb->kijab", bases, bases)
+    plain = IntervalSum(intervals.gradient, hessian, intervals.metric)
+    wide = KktLayout.of(of.layout.plain, rows)
+    band = of.layout.plain.assemble(intervals.metric[..., None, None] * np.eye(DOF))
+    y = np.zeros(sum(each.size for each in rows))
+    of = KktModel(plain, rows, y, wide, band, wide.extended(band))
+    H, A, _ = dense(of)
+    assert np.linalg.matrix_rank(H) < len(H)
+    assert of.negative_eigenvalues() == 0
+    c = A @ rng.standard_normal(len(H))
+    factor = of.factor(0.0)
+    assert factor is not None
+    s, z = factor.solve(-of.gradient, -c)
+    np.testing.assert_allclose(A @ s, -c, rtol=0, atol=1e-9 * np.abs(c).max())
+    left = H @ s + A.T @ z + of.gradient
+    np.testing.assert_allclose(left, 0.0, atol=1e-8 * np.abs(of.gradient).max())
+
+
 @CASES
 @pytest.mark.parametrize("repeated", [False, True])
 def test_signs_count_the_negative_eigenvalues_of_the_tangent_space(

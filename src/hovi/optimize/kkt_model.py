@@ -8,7 +8,9 @@ unknown in the order of elimination, so that the KKT matrix
 is a band matrix like H. It is factored as L S L^T with signs S, without pivoting: H + shift D is
 positive definite on the tangent space A s = 0 exactly where as many signs are negative as there are
 equations. A small delta makes equations harmless that depend on each other; refinement removes it
-from the solutions. [NocedalWright2006, section 16.2; Vanderbei1995]
+from the solutions. H alone may be singular, as that of a linear system is whose passive joints the
+cost leaves out: H + rho A^T A, the same on the tangent space, then keeps the factor accurate.
+[NocedalWright2006, section 16.2; Vanderbei1995]
 """
 
 from __future__ import annotations
@@ -180,14 +182,21 @@ class KktFactor:
     """L S L^T of [H + shift D, A^T; A, -delta I].
 
     negative: number of negative signs; -1 where there is no factor. delta: what refinement removes,
-    0 where delta belongs to the system to solve.
+    0 where delta belongs to the system to solve. rho: of rho A^T A in the matrix, which changes the
+    multipliers alone.
     """
 
     def __init__(
-        self, layout: KktLayout, matrix: Array, metric: Array, shift: float, delta: float
+        self,
+        layout: KktLayout,
+        matrix: Array,
+        metric: Array,
+        shift: float,
+        delta: float,
+        rho: float,
     ) -> None:
         self.layout, self.matrix, self.metric, self.shift = layout, matrix, metric, shift
-        self.delta = delta
+        self.delta, self.rho = delta, rho
         self.factor, self.signs = np.empty_like(matrix), np.ones(len(matrix))
         out = layout.profile, layout.size, self.signs, self.factor
         self.negative: int = native.factor_signed(matrix, metric, shift, *out)
@@ -203,7 +212,7 @@ class KktFactor:
         x = self._solved(rhs)
         if self.delta > 0.0:
             x = x + self._solved(rhs - self._product(x))
-        return x[at.unknowns], x[at.multipliers]
+        return x[at.unknowns], x[at.multipliers] + self.rho * target
 
     def _solved(self, rhs: Array) -> Array:
         x = np.empty_like(rhs)
@@ -252,6 +261,16 @@ class KktModel:
         return self.layout.matrix(self.plain.intervals.hessian, self.rows)
 
     @cached_property
+    def _regular(self) -> Array:
+        """The matrix with H + rho A^T A in place of H."""
+        hessian = self.plain.intervals.hessian.copy()
+        for each in self.rows:
+            m = each.slopes.shape[2]
+            product = np.einsum("keai,kebj->kabij", each.slopes, each.slopes)
+            hessian[each.index, :m, :m] += product / self._scale
+        return self.layout.matrix(hessian, self.rows)
+
+    @cached_property
     def _rows_alone(self) -> Array:
         return self.layout.matrix(None, self.rows)
 
@@ -270,27 +289,39 @@ class KktModel:
         return max(float(np.max(np.abs(each.slopes), initial=0.0)) for each in self.rows)
 
     @cached_property
-    def _delta(self) -> float:
+    def _scale(self) -> float:
+        """|A|^2 / |H|, which is 1 / rho."""
         largest = float(np.max(np.abs(self.plain.intervals.hessian), initial=0.0))
-        scale = self._largest_slope**2 / largest if largest > 0.0 else 0.0
-        return DELTA * (scale or 1.0)
+        return (self._largest_slope**2 / largest if largest > 0.0 else 0.0) or 1.0
 
     def factor(self, shift: float, delta: float | None = None) -> KktFactor | None:
         """The factor; None where H + shift D is not positive definite on A s = 0.
 
         delta: as a part of the system to solve; a small one, which refinement removes, if None.
         """
-        factor = self._factored(self._matrix, shift, delta)
+        factor = (
+            self._without_delta(shift)
+            if delta is None
+            else self._factored(self._matrix, shift, delta)
+        )
         return factor if factor.negative == self.equations else None
 
     def normal_factor(self, damping: float, delta: float | None = None) -> KktFactor:
         """As `factor`, with damping D in place of H + shift D."""
-        return self._factored(self._rows_alone, damping, delta)
+        small = DELTA * self._scale if delta is None else 0.0
+        return self._factored(self._rows_alone, damping, small or delta or 0.0, small)
 
-    def _factored(self, band: Array, shift: float, delta: float | None) -> KktFactor:
-        matrix, removed = band.copy(), self._delta if delta is None else 0.0
-        matrix.ravel()[self.layout.corners] = -(removed if delta is None else delta)
-        return KktFactor(self.layout, matrix, self.metric, shift, removed)
+    def _without_delta(self, shift: float, delta: float = DELTA) -> KktFactor:
+        """The factor for solutions from which refinement removes delta |A|^2 / |H|."""
+        small = delta * self._scale
+        return self._factored(self._regular, shift, small, small, 1.0 / self._scale)
+
+    def _factored(
+        self, band: Array, shift: float, delta: float, removed: float = 0.0, rho: float = 0.0
+    ) -> KktFactor:
+        matrix = band.copy()
+        matrix.ravel()[self.layout.corners] = -delta
+        return KktFactor(self.layout, matrix, self.metric, shift, removed, rho)
 
     def negative_eigenvalues(self) -> int:
         """Number of negative eigenvalues of H on the tangent space A s = 0; -1 if undecided.
@@ -298,9 +329,8 @@ class KktModel:
         Those of the KKT matrix less the number of equations: see [Gould1985]. Two values of delta
         have to agree.
         """
-        counts = {self._factored(self._matrix, 0.0, d * self._delta).negative for d in (1.0, 1e-2)}
-        count = counts.pop()
-        return -1 if counts or count < 0 else count - self.equations
+        counts = {self._without_delta(0.0, d * DELTA).negative for d in (1.0, 1e-2)}
+        return -1 if len(counts) > 1 else max(counts.pop() - self.equations, -1)
 
     def jacobian_product(self, s: Array) -> Array:
         """A s."""
@@ -323,10 +353,8 @@ class KktModel:
 
     def curvature(self, s: Array) -> float:
         """s.H s."""
-        x, product = np.zeros(self.layout.size), np.empty(self.layout.size)
-        x[self.layout.unknowns] = s
-        native.product(self._matrix, self.layout.profile, x, product)
-        return float(x @ product)
+        columns, hessian = self.plain.gather(s), self.plain.intervals.hessian
+        return float(np.einsum("kai,kabij,kbj->", columns, hessian, columns, optimize=True))
 
     def length(self, s: Array) -> float:
         """|s| in the metric."""

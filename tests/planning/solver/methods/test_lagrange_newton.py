@@ -5,11 +5,13 @@ from __future__ import annotations
 import dataclasses
 from functools import cache
 from itertools import pairwise
+from pathlib import Path
 
 import casadi as ca
 import numpy as np
 import pinocchio as pin
 import pytest
+import scipy.linalg
 
 import hovi
 from hovi import Status, solve
@@ -130,6 +132,48 @@ def test_the_last_steps_converge_quadratically(scene: str, scheme: str) -> None:
         assert after.shift == 0.0
         assert np.log(after.decrease) < 1.3 * np.log(before.decrease) or after.decrease < 1e-11
     assert last[-1].decrease < 1e-9
+
+
+GANTRY = """<robot name="gantry"><link name="base"/>
+  <link name="cart"><inertial><mass value="1"/>
+    <inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial></link>
+  <link name="load"><inertial><mass value="1"/>
+    <inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial></link>
+  <joint name="drive" type="prismatic"><parent link="base"/><child link="cart"/>
+    <axis xyz="1 0 0"/><limit lower="-9" upper="9" effort="9" velocity="9"/></joint>
+  <joint name="spring" type="prismatic"><parent link="cart"/><child link="load"/>
+    <axis xyz="1 0 0"/><limit lower="-9" upper="9" effort="9" velocity="9"/></joint></robot>"""
+"""A cart with a sprung load of its mass, 1 kg: a linear system."""
+
+
+def least_effort(k: float, T: float) -> float:
+    """Half the integral of u^2 that moves the cart by 1 m in T, by its Gramian."""
+    A, B = np.zeros((4, 4)), np.array([0.0, 0.0, 1.0, -1.0])
+    A[[0, 1], [2, 3]], A[2:, 1] = 1.0, [k, -2.0 * k]
+    both = np.block([[-A, np.outer(B, B)], [np.zeros((4, 4)), A.T]])
+    flow = scipy.linalg.expm(T * both)
+    gramian = flow[4:, 4:].T @ flow[:4, 4:]
+    return 0.5 * float(np.linalg.inv(gramian)[0, 0])
+
+
+@pytest.mark.parametrize("scheme", ["galerkin-0", "galerkin-2", "galerkin-2x8", "galerkin-4"])
+@pytest.mark.parametrize("distance", [0.0, 1.0])
+def test_a_linear_system_takes_one_step_to_its_minimum(
+    tmp_path: Path, scheme: str, distance: float
+) -> None:
+    """The Hessian of its effort, which leaves out the passive joint's force, is singular."""
+    (tmp_path / "gantry.urdf").write_text(GANTRY)
+    robot = hovi.load_robot(tmp_path / "gantry.urdf")
+    springs = hovi.effects.JointSprings([0.0, 10.0])
+    scene = hovi.Scene(robot, [springs], passive=["spring"])
+    grid = hovi.Grid.uniform(3.0, 48, hovi.schemes.by_name(scheme))
+    ld = hovi.DiscreteLagrangian(scene.effort_lagrangian(), grid)
+    problem = hovi.TrajectoryProblem(ld, hovi.State([0.0, 0.0]), hovi.State([distance, 0.0]))
+    found = solve(problem)
+    assert found.success, found.message
+    assert found.n_neg == 0
+    assert found.nit <= 3
+    assert found.cost == pytest.approx(distance**2 * least_effort(10.0, 3.0), rel=1e-4)
 
 
 @pytest.mark.parametrize("scene", SWING_UPS)
