@@ -15,9 +15,11 @@ from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import Grid
 from hovi.discrete.state import State
 from hovi.effects import Gravity
+from hovi.optimize.ended import Ended, Outputs, Reason
 from hovi.planning.problem.goals import Via
 from hovi.planning.problem.limits import as_limits
 from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.solver.status import status_of
 from hovi.robot.loading import load_robot
 from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
@@ -76,6 +78,15 @@ def test_with_a_free_last_velocity_the_conjugate_points_are_others(
 ) -> None:
     problem = oscillating(two_link, T, 24, free_velocity=["elbow"])
     assert_told(solve(problem, escape_saddles=False), index)
+
+
+def test_directions_that_were_not_counted_have_no_number(two_link: Robot) -> None:
+    problem = oscillating(two_link, 1.0, 8)
+    path = problem.guess("cubic")
+    ended = Ended(path, Outputs(1.0, np.zeros(0)), None, Reason.STATIONARY)
+    status, message = status_of(problem, ended, 1.0, 3, -1)
+    assert status is Status.SADDLE
+    assert message.startswith("perhaps a saddle, of cost 1: rounding errors hide its curvature;")
 
 
 @pytest.mark.parametrize("T", [T for T, index in HORIZONS.items() if index > 0])

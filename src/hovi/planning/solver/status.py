@@ -94,11 +94,13 @@ def status_of(
             f"a minimum of cost {cost:.10g} after {nit} steps.{left}",
         )
     if ended.why is Reason.STATIONARY:
-        return (
-            Status.SADDLE,
-            f"a saddle of cost {cost:.10g} with {n_neg} directions of negative curvature; "
-            "solve again with escape_saddles=True or another guess.",
+        curved = (
+            f"a saddle of cost {cost:.10g} with {n_neg} directions of negative curvature"
+            if n_neg > 0
+            else f"perhaps a saddle, of cost {cost:.10g}: rounding errors hide its curvature"
         )
+        advice = "solve again with escape_saddles=True or another guess"
+        return Status.SADDLE, f"{curved}; {advice}."
     status, reason = unfinished(ended.why)
     return status, (
         f"{reason} after {nit} steps, before a minimum was found; the motion is the "
