@@ -32,6 +32,7 @@ class Rule:
 
 
 NOTICED = {
+    "reopen slacks": "test_example_runs_headless[06_seven_joints]",
     "search again on the new grid": "test_the_code_of_a_page_runs[from_drake]",
     "another branch clear of links": "test_links_that_would_meet_count_in_the_choice",
     "held ends": "test_random_poses_are_reached_in_the_cheapest_branch[11]",
@@ -285,6 +286,13 @@ _rule(
     "After four steps in a row that bounds cut, mu is raised tenfold.",
     "_Iteration._raise_mu",
     "self.cut < MOST_CUT or mu <= ended.z.mu",
+    "True",
+)
+_rule(
+    "reopen slacks",
+    "Among obstacles a stalled solve moves its slacks inside and goes on.",
+    "_Iteration._reopened",
+    "not objective.reopens or self.reopenings >= MAX_REOPENINGS or outside > LARGEST_REOPENED",
     "True",
 )
 _rule(

@@ -57,10 +57,15 @@ NEXT_REFINEMENT = 0.1
 REOPENED, MOST_REOPENED = 0.1, 1e-2
 """Least barrier parameter after a refinement with outputs outside their bounds, relative to how far
 they are and to the mean density, and its largest value, relative to the mean density."""
+LEAST_REOPENED, LARGEST_REOPENED, MAX_REOPENINGS = 1e-5, 0.1, 6
+"""Where outputs may be missed for a while: the least such parameter, the largest |y - s| at which
+slacks are moved away from their bounds instead of ending as diverged, and how many times."""
 SADDLE_LEVEL, SADDLE_MARGIN = 1e-4, 0.1
 """Least barrier parameter, relative to the mean density, with which a solve goes on from a saddle
 that an inexact model led to, and the least distance of slacks from their bounds then, relative to
 the range, per barrier parameter."""
+REOPENED_LEVEL = 0.3
+"""The least such parameter, relative to the mean product of multipliers and gaps."""
 SAVED_AGAIN = 1.5
 """A saved iterate is replaced while the mean product is below this many times its first one."""
 MAX_REFINEMENTS = 40
@@ -135,7 +140,7 @@ class _Iteration(BoundedSteps[X]):
         self.stalled = self.unmet = 0
         self.violations: list[float] = []
         self.level = FIRST_REFINEMENT
-        self.refinements = self.saddles = 0
+        self.refinements = self.reopenings = self.saddles = 0
         self.first_product = 0.0
         self.cut, self.radius_to_restore = 0, 0.0
 
@@ -168,8 +173,10 @@ class _Iteration(BoundedSteps[X]):
                     model = self.model()
                 continue
             if self._is_hopeless():
-                self.ended.why = Reason.DIVERGED
-                return
+                if not self._reopened():
+                    self.ended.why = Reason.DIVERGED
+                    return
+                refined = True
             if accepted or refined:
                 model = self.model()
 
@@ -258,6 +265,18 @@ class _Iteration(BoundedSteps[X]):
             slow = min(last) > LARGE_VIOLATION and last[-1] > (1 - SLOW_DECREASE) * last[0]
         stalled = self.stalled >= MAX_STALLED_STEPS
         return stalled or slow or self.penalty > MAX_FORCE * self.density
+
+    def _reopened(self) -> bool:
+        """Whether the slacks were moved away from their bounds again, to go on from there."""
+        ended, objective = self.ended, self.objective
+        outside = ended.violation
+        if not objective.reopens or self.reopenings >= MAX_REOPENINGS or outside > LARGEST_REOPENED:
+            return False
+        self.reopenings += 1
+        level = REOPENED_LEVEL * self.product / self.density
+        fraction = max(min(REOPENED * outside, MOST_REOPENED), LEAST_REOPENED, level)
+        self._move_inside(fraction * self.density, max(REOPENED * outside, LEAST_REOPENED))
+        return True
 
     def _move_inside(self, mu: float, margin: float) -> None:
         """Move slacks away from their bounds, with a barrier parameter to go on with."""

@@ -406,6 +406,8 @@ class BoundedSearch:
         others = [] if more is None else [more.worst(trajectory, self.limits.tolerance)]
         limits = limit_conditions(self.limits, order, trajectory.space, on)
         found = [*others, *(worst(trajectory, each) for each in limits)]
+        if not found:  # distances alone, which have rows
+            return self.too_close(path)
         i = int(np.argmax([excess for excess, _ in found]))  # what is no number comes first
         return found[i][1] + (
             static_sentence(self.problem, self.limits) if i >= len(others) else ""
