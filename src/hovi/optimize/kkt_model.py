@@ -265,9 +265,10 @@ class KktModel:
         """The matrix with H + rho A^T A in place of H."""
         hessian = self.plain.intervals.hessian.copy()
         for each in self.rows:
-            m = each.slopes.shape[2]
-            product = np.einsum("keai,kebj->kabij", each.slopes, each.slopes)
-            hessian[each.index, :m, :m] += product / self._scale
+            B, _, m, n = each.slopes.shape
+            product = np.matmul(each.flat.transpose(0, 2, 1), each.flat / self._scale)
+            blocks = product.reshape(B, m, n, m, n).transpose(0, 1, 3, 2, 4)
+            hessian[each.index, :m, :m] += blocks
         return self.layout.matrix(hessian, self.rows)
 
     @cached_property
