@@ -10,17 +10,20 @@ saddles were put in by negative curvature of a few intervals. delta: relative to
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import scipy.linalg
 from measuring import print_table
 from underactuated import SCENES, problem_on
 
-from hovi.optimize.kkt_model import KktModel
+from hovi.optimize.kkt_model import KktFactor, KktModel
 from hovi.optimize.quadratic_model import IntervalSum
 from hovi.planning.solver.constrained_action import ConstrainedAction
 from hovi.planning.solver.solver import solve_on_grid
 
 Array = np.ndarray
+Solve = Callable[[Array], Array]
 SCHEMES, INTERVALS = ("galerkin-1", "galerkin-3"), (30, 200)
 DELTAS = 1e-2, 1e-4, 1e-6, 1e-8, 1e-10
 REFINEMENTS = 4
@@ -64,18 +67,26 @@ def with_saddles(model: KktModel, saddles: int) -> KktModel:
     return KktModel(other, model.rows, y, model.layout, band, model.metric)
 
 
-def refined(solve: object, matrix: Array, rhs: Array) -> int | None:
-    """Number of refinements until the residual is CONVERGED; None for more than REFINEMENTS."""
-    x, size = np.zeros_like(rhs), np.linalg.norm(matrix, 2)
+def refined(solve: Solve, matrix: Array, size: float, rhs: Array) -> int | None:
+    """Number of refinements until the residual is CONVERGED; None for more than REFINEMENTS.
+
+    size: |matrix|.
+    """
+    x = np.zeros_like(rhs)
     for count in range(REFINEMENTS + 1):
-        x = x + solve(rhs - matrix @ x)  # type: ignore[operator]
+        x = x + solve(rhs - matrix @ x)
         if np.linalg.norm(rhs - matrix @ x) <= CONVERGED * size * np.linalg.norm(x):
             return count
     return None
 
 
-def penalized(H: Array, A: Array, delta: float) -> tuple[object, int]:
-    """A step of [H, A^T; A, -delta I] by the factor of H + A^T A / delta, and its n_neg."""
+def signed(factor: KktFactor, size: int) -> Solve:
+    """Steps by L S L^T; size: number of unknowns."""
+    return lambda r: np.concatenate(factor.solve(r[:size], r[size:]))
+
+
+def penalized(H: Array, A: Array, delta: float) -> Solve:
+    """Steps of [H, A^T; A, -delta I] by the factor of H + A^T A / delta."""
     K, n = H + A.T @ A / delta, len(H)
     lu = scipy.linalg.lu_factor(K)
 
@@ -83,7 +94,7 @@ def penalized(H: Array, A: Array, delta: float) -> tuple[object, int]:
         s = scipy.linalg.lu_solve(lu, r[:n] + A.T @ r[n:] / delta)
         return np.concatenate([s, (A @ s - r[n:]) / delta])
 
-    return solve, int((np.linalg.eigvalsh(K) < 0).sum())
+    return solve
 
 
 def row(scene: str, scheme: str, intervals: int) -> list[object]:
@@ -93,19 +104,19 @@ def row(scene: str, scheme: str, intervals: int) -> list[object]:
     rhs = np.random.default_rng(1).standard_normal(len(H) + len(A))
     matrix = np.block([[H, A.T], [A, np.zeros((len(A), len(A)))]])
     unit = np.abs(A).max() ** 2 / np.abs(H).max()
-    signed, plain = [], []
+    size, by_signs, plain = float(np.linalg.norm(matrix, 2)), [], []
     for delta in DELTAS:
         factor = model.factor(0.0, delta * unit)
-        solve = lambda r, f=factor: np.concatenate(f.solve(r[: len(H)], r[len(H) :]))  # noqa: E731
-        signed.append("-" if factor is None else refined(solve, matrix, rhs))
-        plain.append(refined(penalized(H, A, delta * unit)[0], matrix, rhs))
+        solve = None if factor is None else signed(factor, len(H))
+        by_signs.append("-" if solve is None else refined(solve, matrix, size, rhs))
+        plain.append(refined(penalized(H, A, delta * unit), matrix, size, rhs))
     Z, counts = scipy.linalg.null_space(A), []
     for saddles in range(4 if intervals < 100 else 0):
         other = with_saddles(model, saddles)
         right = int((np.linalg.eigvalsh(Z.T @ dense(other)[0] @ Z) < 0).sum())
         counts.append((right, other.negative_eigenvalues()))
     said = ", ".join(f"{right} ({mine})" for right, mine in counts) or "-"
-    words = [" ".join("no" if x is None else str(x) for x in each) for each in (signed, plain)]
+    words = [" ".join("no" if x is None else str(x) for x in each) for each in (by_signs, plain)]
     return [scene, f"{scheme}, {intervals}", *words, said]
 
 

@@ -30,7 +30,7 @@ from hovi.planning.solver.multipliers import Multipliers
 Array = npt.NDArray[np.float64]
 
 PENALTY = 3e5
-"""The first penalty, relative to the mean weight of the other joints' torques."""
+"""`penalty`, relative to the mean weight of the other joints' torques."""
 
 # called at each step
 _expand = without_checks(DiscreteLagrangian.expand)
@@ -40,7 +40,7 @@ class ConstrainedAction(EqualityObjective[DiscretePath]):
     """The discrete action in nodal coordinates, and the equations.
 
     problem: the trajectory problem. path: a guess, whose action scales the conditions at nodes.
-    penalty: the first one for `minimize_under_equations`.
+    penalty, node_penalty: weights of |c|^2 for which moments and conditions at nodes count alike.
     """
 
     def __init__(self, problem: TrajectoryProblem, path: DiscretePath) -> None:
