@@ -36,6 +36,15 @@ class Cells:
         k, s = np.repeat(np.arange(intervals), number), np.arange(number) / number
         return cls(k, np.tile(s, intervals), np.tile(s + 1 / number, intervals))
 
+    @classmethod
+    def none(cls) -> Cells:
+        """No cells."""
+        return cls(np.zeros(0, dtype=np.intp), np.zeros(0), np.zeros(0))
+
+    def lengths(self, steps: Array) -> Array:
+        """Their lengths; steps: of all intervals."""
+        return np.asarray(steps[self.interval] * (self.end - self.begin))
+
     def __len__(self) -> int:
         return len(self.begin)
 

@@ -144,7 +144,7 @@ class NarrowCells:
         self._given, self._of = given, features_of(given)
         self._grid, self._at = grid, at
         self.unresolved, N = False, grid.intervals
-        self.cells = Cells.of(N, FIRST_CELLS).chosen(np.zeros(0, dtype=np.intp))
+        self.cells = Cells.none()
         if self._of.enclosed is not None:
             self._add(self._enclosed)
         if self._of.sampled == "its function":
@@ -187,7 +187,7 @@ class TorqueCells:
     def cells(self) -> Cells:
         """What is to be sampled anew."""
         if not self._effects:
-            return Cells.of(1, 1).chosen(np.zeros(0, dtype=np.intp))
+            return Cells.none()
         return _split_where(self._look, self._motion.grid)[0]
 
     def _look(self, cells: Cells) -> tuple[Mask, Mask]:
@@ -249,12 +249,12 @@ def _look(sampled: Sampled, parts: int, cells: Cells) -> tuple[Mask, Mask]:
 def _split_where(look: Look, grid: Grid) -> tuple[Cells, bool]:
     """The pieces of those cells that are to be split, until none is, and whether some still are."""
     cells = Cells.of(grid.intervals, FIRST_CELLS)
-    found = cells.chosen(np.zeros(0, dtype=np.intp))
+    found = Cells.none()
     whole = True  # whose samples are those of a first pass
     while len(cells) > 0:
         raise_if_late()
         sampled, wild = look(cells)
-        steps = grid.steps[cells.interval] * (cells.end - cells.begin)
+        steps = cells.lengths(grid.steps)
         split = wild & (steps > SPLIT * LEAST_FRACTION * grid.duration)
         if not whole:
             found = found.joined(cells.chosen(sampled & ~split))

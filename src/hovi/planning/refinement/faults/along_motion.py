@@ -133,7 +133,7 @@ class _Look:
         errors, names, values = error_of(cells)
         while errors.sum() > self.budget:
             cut = errors > self.budget / (2 * len(cells))
-            steps = grid.steps[cells.interval] * (cells.end - cells.begin)
+            steps = cells.lengths(grid.steps)
             more_cells = (SPLIT - 1) * np.count_nonzero(cut)
             if steps[cut].min() < SPLIT * limit or len(cells) + more_cells > MAX_CELLS:
                 i = int(np.argmax(errors))
@@ -160,7 +160,7 @@ class _Look:
         jet = self.motion.jet_intervals(k, s, self.lagrangian.order)
         t = self.motion.t[k] + s * self.motion.grid.steps[k]
         values = self.lagrangian.value(*jet, t=t).reshape(len(cells), -1)
-        steps = self.motion.grid.steps[cells.interval] * (cells.end - cells.begin)
+        steps = cells.lengths(self.motion.grid.steps)
         fewer = len(_RULES[0][0])
         pairs = zip(_RULES, (values[:, :fewer], values[:, fewer:]), strict=True)
         return np.stack([steps * (x @ rule[1]) / 2 for rule, x in pairs])
@@ -188,7 +188,7 @@ class _Look:
 
     def _of_scene(self, seen: _Seen, cells: Cells) -> list[tuple[str, Array]]:
         """What each effect of a scene may hide, (P,) each, with its name."""
-        steps = self.motion.grid.steps[cells.interval] * (cells.end - cells.begin)
+        steps = cells.lengths(self.motion.grid.steps)
         boxes, rates, tau = self._boxes(cells, steps)
         found = []
         for effect, peaks in zip(seen.bounded, seen.peaks, strict=False):
