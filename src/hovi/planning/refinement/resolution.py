@@ -122,7 +122,12 @@ def solve(
         report=report,
         method=method,
     )
-    return resolved(found)
+    return with_check(resolved(found))
+
+
+def with_check(solution: Solution) -> Solution:
+    """The solution, whose replans are checked whatever its status is."""
+    return solution if solution.check else dataclasses.replace(solution, check=resolved)
 
 
 @one_blas_thread
@@ -162,7 +167,7 @@ def resolved(solution: Solution) -> Solution:
     if reason:
         return _unresolved(solution, reason)
     if solution.status is Status.STATIONARY:
-        return dataclasses.replace(solution, check=resolved)
+        return with_check(solution)
     return dataclasses.replace(solution, check=Resolution.of(solution))
 
 

@@ -29,6 +29,7 @@ from hovi.planning.problem.presolve.findings import findings
 from hovi.planning.problem.presolve.length_slips import grasped_slips
 from hovi.planning.problem.units import Duration, as_duration
 from hovi.planning.refinement.faults.cautions import keeping_warnings, with_cautions_of_motion
+from hovi.planning.refinement.resolution import with_check
 from hovi.planning.search.branch_choice import Ends, chosen_ends, nearest_ends
 from hovi.planning.search.free_duration import FreeDuration
 from hovi.planning.search.group import in_group, with_others
@@ -187,7 +188,7 @@ def with_notes(
     apart: Apart,
     setup_seconds: float | None = None,
 ) -> Solution:
-    """The solution, with a message that ends with what was left unsaid, self-collision included.
+    """The solution with its check, and a message that ends with what was left unsaid.
 
     scenes: of its segments; what one of them says is said. apart: see `kept_apart`.
     """
@@ -199,7 +200,7 @@ def with_notes(
     cautions = notes if found.success else [Caution(STATUS, found.message), *notes]
     setup = found.setup_seconds if setup_seconds is None else setup_seconds
     message = " ".join([found.message, *said])
-    found = dataclasses.replace(found, message=message, setup_seconds=setup)
+    found = dataclasses.replace(with_check(found), message=message, setup_seconds=setup)
     return with_cautions_of_motion(found, cautions)
 
 

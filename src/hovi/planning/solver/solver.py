@@ -268,7 +268,7 @@ class _Again:
                 begun = True
                 found = self._solved(deadline.part(SOLVE_FRACTION).seconds_left, options)
                 if found.status is not Status.TIME_LIMIT:
-                    done = judged(found) if self.check is None else self.check(found)
+                    done = self._checked(found)
                     if done.success or done.usable:
                         return done
                     return self._at_rest(done.status, done.message, done.nit) or done
@@ -283,6 +283,13 @@ class _Again:
             return stopped
         result = last_motion(self.problem, self.path, self.central, steps, last)
         return dataclasses.replace(solution_of(result), check=self.check)
+
+    def _checked(self, found: Solution) -> Solution:
+        """The solution as its check returns it, with a check for the next replan."""
+        if self.check is None:
+            return judged(found)
+        done = self.check(found)
+        return dataclasses.replace(done, check=done.check or self.check)
 
     def _at_rest(self, status: Status, message: str, steps: int) -> Solution | None:
         """A braking motion, unless the last motion is one from the start; None if none is found."""

@@ -26,7 +26,7 @@ def planned() -> hovi.Solution:
         Q,
         1.5,
         limits="none",
-        intervals=8,
+        intervals=30,
         self_collision=False,
     )
 
