@@ -20,6 +20,7 @@ from samples.asked_motions import (
     GROUPS,
     LEFT_OUT,
     REFUSED,
+    USUAL,
     Array,
     Asked,
     effects_of,
@@ -32,11 +33,6 @@ from samples.pairwise import Case, Pair, all_pairs, pairs_of, pairwise
 
 pytestmark = pytest.mark.filterwarnings("ignore::hovi.errors.HoviWarning")
 CASES = pairwise(AXES, LEFT_OUT)
-USUAL = {
-    **{"robot": "three joints", "effect": "gravity", "limits": "urdf", "smooth": "no"},
-    **{"goal": "configuration", "via": "none", "duration": "fixed", "world": "empty"},
-    **{"grid": "intervals", "starts": "1", "call": "plan", "arrays": "list"},
-}
 
 
 def failures(cases: Sequence[Case], folder: Path) -> tuple[list[str], int]:

@@ -160,6 +160,12 @@ AXES: dict[str, tuple[str, ...]] = {
 }
 
 
+USUAL = {
+    **{"robot": "three joints", "effect": "gravity", "limits": "urdf", "smooth": "no"},
+    **{"goal": "configuration", "via": "none", "duration": "fixed", "world": "empty"},
+    **{"grid": "intervals", "starts": "1", "call": "plan", "arrays": "list"},
+}
+"""A value of each axis that goes with all others."""
 REFUSED: tuple[tuple[str, str, str, str], ...] = (
     *(("via", via, "duration", "free") for via in ("configuration", "frame")),
     *(("via", via, "goal", "periodic") for via in ("configuration", "frame")),

@@ -37,7 +37,7 @@ def judged(
         "start": lambda: _start(asked, series, start, goal),
         "goal": lambda: _goal(asked, series, goal),
         "via": lambda: "" if elapsed or goal is not None else _via(asked, motion),
-        "limits": lambda: _limits(asked, series),
+        "limits": lambda: over_limits(asked, series),
         "torques": lambda: _torques(asked, series),
     }
     wrong = ((name, check()) for name, check in checks.items())
@@ -102,7 +102,8 @@ def _via(asked: Asked, motion: hovi.Trajectory) -> str:
     return "" if missed < SAME else f"missed by {missed:.3g}"
 
 
-def _limits(asked: Asked, series: Mapping[str, Array]) -> str:
+def over_limits(asked: Asked, series: Mapping[str, Array]) -> str:
+    """Which limit samples of a motion exceed; "" if none."""
     for name, low, high in asked.bounds:
         limited = np.isfinite(high) & np.isfinite(low)
         low, high, given = low[limited], high[limited], series[name][:, limited]

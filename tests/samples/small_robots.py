@@ -11,11 +11,12 @@ from pathlib import Path
 
 import hovi
 
-LENGTH = 0.4
-"""Of a link, in [m]."""
+LENGTH, RADIUS = 0.4, 0.08
+"""Of a link and of the ball in its middle, in [m]."""
 LINK = f"""<link name="{{0}}"><inertial><origin xyz="{LENGTH / 2} 0 0"/><mass value="0.5"/>
 <inertia ixx="0.01" iyy="0.02" izz="0.02" ixy="0" ixz="0" iyz="0"/></inertial>
-<collision><origin xyz="{LENGTH / 2} 0 0"/><geometry><sphere radius="0.08"/></geometry></collision>
+<collision><origin xyz="{LENGTH / 2} 0 0"/>
+<geometry><sphere radius="{RADIUS}"/></geometry></collision>
 </link>"""
 JOINT = """<joint name="{0}" type="{1}"><parent link="{2}"/><child link="{3}"/>
 <origin xyz="{4} 0 0"/><axis xyz="{5}"/>
@@ -45,11 +46,21 @@ def arm(name: str, kinds: Sequence[str], free_flyer: bool = False) -> hovi.Robot
     return hovi.load_robot(path, free_flyer=free_flyer or None)
 
 
+BALL = 0.05
+"""Radius of the collision shapes of `with_shapes`, in [m]."""
+
+
 @cache
-def with_shapes(model: str) -> hovi.Robot:
-    """A model of the project, with a ball as the collision shape of every link of its own mass."""
-    ball = '<collision><geometry><sphere radius="0.05"/></geometry></collision>'
-    text = Path(hovi.example(model)).read_text().replace("</inertial>", f"</inertial>{ball}")
-    path = _folder() / model
+def with_shapes(model: str, base: str = "", above: float = 0.0) -> hovi.Robot:
+    """A model of the project, with a ball as the collision shape of every link of its own mass.
+
+    base: a link without a mass that gets one, too, at a height above its origin, in [m].
+    """
+    ball = f'<geometry><sphere radius="{BALL}"/></geometry></collision>'
+    text = Path(hovi.example(model)).read_text()
+    text = text.replace("</inertial>", f"</inertial><collision>{ball}")
+    shaped = f'<link name="{base}"><collision><origin xyz="0 0 {above}"/>{ball}'
+    text = text.replace(f'<link name="{base}">', shaped) if base else text
+    path = _folder() / f"{base}{model}"
     path.write_text(text)
     return hovi.load_robot(path)
