@@ -376,6 +376,11 @@ def size_of(c: Array) -> float:
 class EqualityObjective(ABC, Generic[X]):
     """An objective f under equations c = 0, on a manifold."""
 
+    @property
+    def negligible(self) -> float:
+        """Value that counts as none: decreases are relative to no smaller one."""
+        return 0.0
+
     @abstractmethod
     def evaluate(self, x: X) -> Outputs:
         """f and c at x; not finite where they are not defined."""

@@ -162,7 +162,7 @@ class _Search(Generic[X]):
         curvature = abs(model.curvature(step))
         new = ended.z + change
         decrease = 0.5 * curvature + abs(float(new @ c))
-        relative = decrease / max(abs(ended.value), 1e-300)
+        relative = decrease / max(abs(ended.value), self.objective.negligible, 1e-300)
         small = relative <= self.criteria.decrease or self._is_short(model, step)
         settled = small and self.objective.feasible(ended.x)
         if settled and shift > 0.0:  # perhaps a saddle

@@ -52,6 +52,11 @@ NO_OUTPUTS: Array = np.zeros(0)
 class Objective(ABC, Generic[X]):
     """An objective to minimise on a manifold: value, quadratic model, retraction and norm."""
 
+    @property
+    def negligible(self) -> float:
+        """Value that counts as none: decreases are relative to no smaller one."""
+        return 0.0
+
     @abstractmethod
     def value(self, x: X) -> float:
         """The objective at x; not finite where it is not defined."""
@@ -186,7 +191,7 @@ def _is_stationary(
         return True
     if not trial.newton:
         return False
-    if trial.decrease <= criteria.decrease * abs(ended.value):
+    if trial.decrease <= criteria.decrease * max(abs(ended.value), objective.negligible):
         return True
     short = trial.norm <= SIZE_TEST_LENGTH * criteria.radius
     return short and objective.relative_size(ended.x, trial.step, model) <= criteria.step

@@ -116,10 +116,10 @@ def deviation(
     )
 
 
-def relative_difference(value: float, reference: float) -> float:
-    """|value - reference| / |reference|; 0 if both are 0."""
-    difference = abs(value - reference)
-    return 0.0 if difference == 0 else difference / max(abs(reference), np.finfo(float).tiny)
+def relative_difference(value: float, reference: float, least: float = 0.0) -> float:
+    """|value - reference| / max(|reference|, least); 0 if both are 0."""
+    difference, size = abs(value - reference), max(abs(reference), least, np.finfo(float).tiny)
+    return 0.0 if difference == 0 else float(difference / size)
 
 
 def sample_points(trajectory: Trajectory) -> tuple[Index, Array]:

@@ -55,6 +55,11 @@ from hovi.system.dataclass import dataclass
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
 
+NEGLIGIBLE_TORQUE = 1e-6
+"""Torques whose cost counts as none, relative to `TrajectoryProblem.torque_scale`."""
+SMALL_DISPLACEMENT = 0.01
+"""Displacement whose torque is a scale of torques, in [rad] or [m]."""
+
 
 @check_arguments
 @dataclass(frozen=True, eq=False, repr=False)
@@ -313,6 +318,39 @@ class TrajectoryProblem(ProblemSummary):
             return 0.0
         mass = MassMatrix(self.scene.model)(self.ends[0][:1])[0]
         return float(np.max(np.diag(mass))) / self.grid.duration**2
+
+    @cached_property
+    def stiffness(self) -> float:
+        """max_i sum_j |d tau_i / d q_j| at rest at the ends, in [N m/rad]; 0 without torques.
+
+        Where torques cancel, as at an equilibrium under gravity, their rounding errors are left,
+        of this size times that of rounding.
+        """
+        if not (self.about_robot and len(self.ld.lagrangian.output_weight) > 0):
+            return 0.0
+        q, rest = self.ends[0], np.zeros((2, self.coordinates.nv))
+        times = np.array([0.0, self.grid.duration])
+        scenes = self.scenes[0], self.scenes[-1]
+        slopes = [scene.torques.linearize(q, rest, rest, times)[1] for scene in scenes]
+        return float(np.abs(np.stack(slopes)[..., : rest.shape[1]]).sum(axis=-1).max())
+
+    @property
+    def torque_scale(self) -> float:
+        """The inertial torque, or that of a small displacement if it is larger, in [N m]."""
+        return max(self.inertial_torque, SMALL_DISPLACEMENT * self.stiffness)
+
+    @property
+    def negligible_cost(self) -> float:
+        """Cost that counts as none: that of torques of a small fraction of `torque_scale`."""
+        torque = NEGLIGIBLE_TORQUE * self.torque_scale
+        return self.mean_output_weight * torque**2 * self.grid.duration
+
+    @property
+    def mean_output_weight(self) -> float:
+        """The mean weight of outputs in the cost, passive joints left out; 1 without any."""
+        weights = np.delete(self.ld.lagrangian.output_weight, self.passive)
+        weights = weights[weights > 0]
+        return float(weights.mean()) if len(weights) > 0 else 1.0
 
     @property
     def passive(self) -> npt.NDArray[np.intp]:

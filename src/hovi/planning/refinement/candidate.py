@@ -253,7 +253,7 @@ def error_of_cost(solution: Solution, finer: FinerSolution) -> float:
 
     Not below ROUNDING_FLOOR; 0 for zero cost with zero error.
     """
-    error = relative_difference(finer.known, finer.cost)
+    error = relative_difference(finer.known, finer.cost, finer.problem.negligible_cost)
     if finer.known == 0:
         return error
     problem = solution.problem
@@ -288,7 +288,8 @@ def error_along(solution: Solution, finer: FinerSolution) -> float:
     if not all(is_galerkin(scheme) for scheme, _ in problem.grid.groups):
         return 0.0
     integral = integral_along(problem.ld.lagrangian, solution.trajectory)
-    return relative_difference(integral.value + price_of_time(problem), finer.cost)
+    cost = integral.value + price_of_time(problem)
+    return relative_difference(cost, finer.cost, problem.negligible_cost)
 
 
 def least_error(solution: Solution) -> float:
@@ -304,7 +305,8 @@ def least_error(solution: Solution) -> float:
 
 def contributions(finer: FinerSolution) -> Array:
     """|contribution| of each interval to the relative error of the cost, shape (N,)."""
-    return np.asarray(np.abs(finer.gains) / max(abs(finer.cost), np.finfo(float).tiny))
+    size = max(abs(finer.cost), finer.problem.negligible_cost, np.finfo(float).tiny)
+    return np.asarray(np.abs(finer.gains) / size)
 
 
 def _hamiltonian_error(solution: Solution) -> float:

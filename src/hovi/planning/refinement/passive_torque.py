@@ -17,8 +17,8 @@ NEGLIGIBLE_FRACTION = 0.01
 """Largest torque of a passive joint along a motion, relative to that of the other joints."""
 
 LEAST_TORQUE = 1e-9
-"""Smallest torque that others are relative to, as a fraction of the inertia torque M / T^2: at rest
-all torques are rounding errors."""
+"""Smallest torque that others are relative to, as a fraction of `torque_scale`: at rest all torques
+are rounding errors."""
 
 
 class PassiveTorque(NamedTuple):
@@ -48,7 +48,7 @@ def passive_torque(problem: TrajectoryProblem, trajectory: Trajectory) -> Passiv
     if len(passive) == 0 or len(active) == 0:
         return None
     tau = np.abs(trajectory.sample_intervals(*sample_points(trajectory)).tau)
-    largest = max(float(tau[:, active].max()), LEAST_TORQUE * problem.inertial_torque)
+    largest = max(float(tau[:, active].max()), LEAST_TORQUE * problem.torque_scale)
     by_interval = tau[:, passive].max(axis=1).reshape(trajectory.grid.intervals, -1).max(axis=1)
     worst = int(passive[np.argmax(tau[:, passive].max(axis=0))])
     name = trajectory.coordinate_names[worst]

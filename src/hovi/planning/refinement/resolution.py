@@ -35,7 +35,6 @@ from hovi.planning.refinement.faults.on_curve import (
     difference_on_curve,
     fault_of_period,
     fault_on_curve,
-    least_cost,
 )
 from hovi.planning.refinement.faults.remedy import remedy
 from hovi.planning.refinement.limit_sensitivity import limit_prices
@@ -271,7 +270,7 @@ class Resolution(MotionCheck):
             return resolved
         path = shift.path(self.path)
         cost = cost_of(problem, path)
-        estimate = self.estimate * abs(self.cost) / max(abs(cost), least_cost(problem), 1e-300)
+        estimate = self.estimate * abs(self.cost) / max(abs(cost), problem.negligible_cost, 1e-300)
         too_large = estimate > _largest_estimate(problem)
         return resolved if too_large else Resolution(path, cost, estimate)
 
@@ -324,7 +323,7 @@ def _compared(solution: Solution, finer: FinerSolution) -> tuple[Solution, str]:
     estimate, difference = error_of_cost(solution, finer), abs(finer.known - finer.cost)
     compared = with_estimate(solution, estimate)
     assert solution.problem is not None
-    if difference <= RESOLVED * max(abs(solution.cost), least_cost(solution.problem)):
+    if difference <= RESOLVED * max(abs(solution.cost), solution.problem.negligible_cost):
         return compared, ""
     return compared, _cost_change(difference / abs(solution.cost))
 

@@ -42,9 +42,9 @@ MAX_CHART_TURN = 1.4 * np.pi
 """Turn of an orientation within an interval, in [rad], above which the value is infinite."""
 TORQUE_FLOOR = 1e-4
 """Lower bound of the torque scale for residuals, as a fraction of the inertial torque M / T^2."""
-CHART_TORQUE_FLOOR = 2e-5
-"""The same with charts, as a fraction of M |q| / h^2: rounding of the nodes moves torques by 5e-16
-of it, and the equations of passive joints are solved to 1e-10 of the torque scale."""
+ROUNDING_FLOOR = 2e-5
+"""The same as a fraction of |d tau/dq| |q|, and with charts of M |q| / h^2: rounding moves torques
+by 5e-16 of it, and the equations of passive joints are solved to 1e-10 of the torque scale."""
 MAX_BAND_INTERVALS = 1000
 """Maximum number of intervals for the nodal band matrix; its condition number grows like N^4."""
 
@@ -95,6 +95,11 @@ class ActionObjective(Objective[DiscretePath]):
         self._expansion: Expansion | None = None
         self._last: tuple[DiscretePath, list[Jet]] | None = None
         self._outputs: tuple[DiscretePath, list[Array]] | None = None
+
+    @property
+    def negligible(self) -> float:
+        """See Objective.negligible."""
+        return self.problem.negligible_cost
 
     @property
     def expansion(self) -> Expansion:
@@ -171,11 +176,12 @@ class ActionObjective(Objective[DiscretePath]):
     def _least_torque(self, x: DiscretePath) -> float:
         """Lower bound of the torque scale for residuals, in [N m]."""
         inertial, grid = self.problem.inertial_torque, self.problem.grid
-        if self.ld.chart is None:  # then z is stored, and rounding of nodes moves no acceleration
-            return TORQUE_FLOOR * inertial
         size = max(1.0, float(np.abs(x.q).max()))
-        shortest = float(grid.steps.min()) / grid.duration
-        return max(TORQUE_FLOOR, CHART_TORQUE_FLOOR * size / shortest**2) * inertial
+        rounded = size * self.problem.stiffness
+        if self.ld.chart is not None:  # else z is stored: rounding of nodes moves no acceleration
+            shortest = float(grid.steps.min()) / grid.duration
+            rounded = max(rounded, size / shortest**2 * inertial)
+        return max(TORQUE_FLOOR * inertial, ROUNDING_FLOOR * rounded)
 
     @property
     def lagrangian(self) -> Lagrangian:

@@ -105,19 +105,12 @@ def minimize_constrained(
 
 def first_multipliers(problem: TrajectoryProblem, path: DiscretePath) -> Multipliers:
     """Zero multipliers, with penalties scaled by the torque weights and the cost of a path."""
-    weight = mean_output_weight(problem)
+    weight = problem.mean_output_weight
     cost = max(abs(problem.ld.action(path)), 1e-6)
     zero = Multipliers.zero(problem, INITIAL_TORQUE_PENALTY * weight, INITIAL_NODE_PENALTY * cost)
     fraction = ActionObjective(problem, multipliers=zero).residuals(path).torque_fraction
     warm = fraction <= WARM_TORQUE_FRACTION
     return zero.with_scaled_penalties(WARM_PENALTY_FACTOR, 1.0) if warm else zero
-
-
-def mean_output_weight(problem: TrajectoryProblem) -> float:
-    """The mean weight of the outputs in the cost, passive joints left out; 1 without any."""
-    weights = np.delete(problem.ld.lagrangian.output_weight, problem.passive)
-    weights = weights[weights > 0]
-    return float(weights.mean()) if len(weights) > 0 else 1.0
 
 
 def are_met(residuals: Residuals) -> bool:

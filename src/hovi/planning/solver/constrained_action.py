@@ -21,7 +21,6 @@ from hovi.planning.solver.augmented_lagrangian_rounds import (
     INITIAL_NODE_PENALTY,
     NODE_TOLERANCE,
     TORQUE_TOLERANCE,
-    mean_output_weight,
     within,
 )
 from hovi.planning.solver.equations import Equations
@@ -46,7 +45,7 @@ class ConstrainedAction(EqualityObjective[DiscretePath]):
     def __init__(self, problem: TrajectoryProblem, path: DiscretePath) -> None:
         self.problem = problem
         self.action = ActionObjective(problem, "band")
-        self.penalty = PENALTY * mean_output_weight(problem)
+        self.penalty = PENALTY * problem.mean_output_weight
         self.node_penalty = self._first_node_penalty(path)
         self.node_scale = float(np.sqrt(self.node_penalty / self.penalty))
         self.equations = Equations(problem, self.node_scale)
@@ -59,6 +58,11 @@ class ConstrainedAction(EqualityObjective[DiscretePath]):
         expansion = _expand(self.problem.ld, path, "nodal", None, None, self.action.jets(path))
         largest = float(np.max(np.abs(expansion.hessian)))
         return max(INITIAL_NODE_PENALTY * cost, largest, 1e-6)
+
+    @property
+    def negligible(self) -> float:
+        """See EqualityObjective.negligible."""
+        return self.problem.negligible_cost
 
     def evaluate(self, x: DiscretePath) -> Outputs:
         """The action, and c."""

@@ -32,7 +32,7 @@ class Residuals:
 
     torque: of the passive joints at the quadrature points, (P, passive) per batch, in [N m].
     nodes: c of every condition, shape (k,) each. largest_torque: of any joint at any point, in
-        [N m], bounded below by a small fraction of the inertial torque.
+        [N m], bounded below where torques are rounding errors.
     """
 
     torque: list[Array]

@@ -26,7 +26,6 @@ from hovi.planning.refinement.faults.on_curve import (
     RESOLVED,
     costs_on_curve,
     has_own_curve,
-    least_cost,
 )
 from hovi.planning.refinement.spinning import spin_without_limits
 from hovi.planning.solver.solver import Solution
@@ -82,7 +81,7 @@ def _of_grid(solution: Solution, problem: TrajectoryProblem) -> Iterator[Caution
         return
     action, integral = costs_on_curve(solution, problem)
     gap = abs(integral - action)
-    if gap <= RESOLVED * max(abs(integral), least_cost(problem)):
+    if gap <= RESOLVED * max(abs(integral), problem.negligible_cost):
         return
     more = "more" if integral > action else "less"
     yield Caution(

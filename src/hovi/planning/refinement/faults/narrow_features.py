@@ -21,7 +21,6 @@ from hovi.planning.refinement.faults.on_curve import (
     RESOLVED,
     costs_nothing,
     has_own_curve,
-    least_cost,
 )
 from hovi.planning.solver.solver import Solution
 from hovi.system.dataclass import dataclass
@@ -92,7 +91,7 @@ def features_of(solution: Solution) -> Features | None:
     if not may_be_narrow(lagrangian) or costs_nothing(solution):
         return None
     values = problem.ld.values(motion.path)
-    size = max(abs(solution.cost), least_cost(problem), 1e-300)
+    size = max(abs(solution.cost), problem.negligible_cost, 1e-300)
     along = along_motion(lagrangian, motion, size, max(ESTIMATE_FRACTION * estimate, LEAST_ERROR))
     if has_own_curve(problem):
         missed = abs(along.cost - float(values.sum()))

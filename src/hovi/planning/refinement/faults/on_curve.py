@@ -14,8 +14,6 @@ from hovi.schemes import is_galerkin
 
 RESOLVED = 0.01
 """Largest relative difference of costs for a success."""
-NEGLIGIBLE = 1e-12
-"""Cost that counts as none, relative to that of torques of the size of the inertial torque."""
 
 
 def fault_on_curve(solution: Solution) -> str:
@@ -42,7 +40,7 @@ def difference_on_curve(solution: Solution) -> float:
     if not has_own_curve(problem):
         return 0.0
     action, integral = costs_on_curve(solution, problem)
-    return abs(action - integral) / max(abs(integral), least_cost(problem), 1e-300)
+    return abs(action - integral) / max(abs(integral), problem.negligible_cost, 1e-300)
 
 
 def has_own_curve(problem: TrajectoryProblem) -> bool:
@@ -85,7 +83,7 @@ def _fault_of_integral(solution: Solution, problem: TrajectoryProblem) -> str:
     if accuracy is not None and estimate is not None and accuracy.along + estimate <= RESOLVED:
         return ""  # both are that close to the cost of the same finer solution
     action, integral = costs_on_curve(solution, problem)
-    if abs(action - integral) <= RESOLVED * max(abs(integral), least_cost(problem)):
+    if abs(action - integral) <= RESOLVED * max(abs(integral), problem.negligible_cost):
         return ""
     return (
         f"its cost is {action:.6g} at the quadrature points, but {integral:.6g} along its own curve"
@@ -96,12 +94,7 @@ def costs_nothing(solution: Solution) -> bool:
     """Whether the cost is one of rounding errors, whose relative error says nothing."""
     assert solution.problem is not None
     known = solution.error_estimate is not None
-    return known and abs(solution.cost) <= RESOLVED * least_cost(solution.problem)
-
-
-def least_cost(problem: TrajectoryProblem) -> float:
-    """The cost to which differences are relative at least."""
-    return NEGLIGIBLE * problem.inertial_torque**2 * problem.grid.duration
+    return known and abs(solution.cost) <= RESOLVED * solution.problem.negligible_cost
 
 
 def _fault_of_passive(problem: TrajectoryProblem, trajectory: Trajectory) -> str:
