@@ -19,9 +19,6 @@ REFUSED = {
     ("free duration", "time-dependent effect"),
     ("moving obstacle", "advance"),
     ("segments", "advance"),
-    ("segments", "free-flyer"),
-    ("segments", "continuous joints"),
-    ("segments", "passive joint"),
     ("time-dependent effect", "advance"),
 }
 """The pairs that hovi refuses, in the order of FEATURES: leave out the one that no longer is."""

@@ -170,7 +170,6 @@ REFUSED: tuple[tuple[str, str, str, str], ...] = (
     *(("via", via, "duration", "free") for via in ("configuration", "frame")),
     *(("via", via, "goal", "periodic") for via in ("configuration", "frame")),
     *(("goal", "periodic", "robot", name) for name in ("passive", "continuous", "free-flyer")),
-    *(("goal", "segments", "robot", name) for name in ("passive", "continuous", "free-flyer")),
     ("goal", "segments", "duration", "free"),
     *(("robot", "free-flyer", *other) for other in (("smooth", "yes"), ("effect", "jerk"))),
     ("robot", "free-flyer", "effect", "rolling"),

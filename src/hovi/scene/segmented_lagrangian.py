@@ -11,6 +11,7 @@ import numpy.typing as npt
 from hovi.checks.arguments import check_arguments
 from hovi.checks.shapes import require_shape
 from hovi.errors import InputError
+from hovi.robot.space.configuration_space import ConfigurationSpace
 from hovi.robot.space.coordinates import Coordinates
 from hovi.scene.lagrangian import Lagrangian
 from hovi.scene.scene import Scene
@@ -68,6 +69,11 @@ class SegmentedLagrangian(Lagrangian):
         return self.lagrangians[0].nv
 
     @property
+    def space(self) -> ConfigurationSpace | None:
+        """That of the first segment; the others have the same."""
+        return self.lagrangians[0].space
+
+    @property
     def coordinates(self) -> Coordinates:
         """Those of the first segment; the others have the same."""
         return self.lagrangians[0].coordinates
@@ -92,6 +98,11 @@ class SegmentedLagrangian(Lagrangian):
     def output_weight(self) -> Array:
         """R of the first segment; the others have as many outputs."""
         return self.lagrangians[0].output_weight
+
+    def reweighted(self, weight: Array) -> SegmentedLagrangian:
+        """The same segments with another R, shape (m,), in all of them."""
+        parts = tuple(each.reweighted(weight) for each in self.lagrangians)
+        return SegmentedLagrangian(parts, self.ends)
 
     @property
     def needs_torques(self) -> bool:
@@ -160,20 +171,16 @@ class SegmentedLagrangian(Lagrangian):
 
 
 def _require_fitting(first: Lagrangian, other: Lagrangian) -> None:
-    """Raise InputError unless two segments are of one order, on the same vector space."""
+    """Raise InputError unless two segments are of one order, on one space, and driven alike."""
     if isinstance(other, SegmentedLagrangian):
         raise InputError("a segment of a motion has no segments of its own: list all of them.")
-    if other.space is not None:
-        raise InputError(
-            "segments need joints with nq = nv: lock the others with load_robot(..., locked=[...])."
-        )
     if other.order != first.order:
         raise InputError(
             f"all segments must be of one order, got {first.order} and {other.order}: use "
             "Lagrangians of the same order."
         )
     names = first.coordinates.coordinate_names, other.coordinates.coordinate_names
-    if names[0] != names[1]:
+    if names[0] != names[1] or first.coordinates.space != other.coordinates.space:
         raise InputError(
             "all segments must move the same joints, got "
             f"{' and '.join(', '.join(each) for each in names)}: use scenes of one robot."
@@ -185,9 +192,10 @@ def _require_fitting(first: Lagrangian, other: Lagrangian) -> None:
             "all segments must be about a robot and have its torques as outputs, or none: use the "
             "effort of scenes, or CasADi Lagrangians alone, all with a scene or all without."
         )
-    scene = getattr(other, "scene", None)
-    if isinstance(scene, Scene) and scene.passive:
+    passive = [getattr(getattr(each, "scene", None), "passive", ()) for each in (first, other)]
+    if set(passive[0]) != set(passive[1]):
+        listed = (", ".join(map(repr, each)) or "none" for each in passive)
         raise InputError(
-            f"motions in segments do not support passive joints such as {scene.passive[0]!r}: "
-            "solve each segment as a problem of its own."
+            f"all segments must have the same passive joints, got {' and '.join(listed)}: use "
+            "scenes with the same `passive`."
         )

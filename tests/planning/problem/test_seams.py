@@ -48,34 +48,42 @@ def carry(*via: Via, limits: Any = None, order: int = 2) -> TrajectoryProblem:
 
 
 def hold(node: int, fixed: list[list[bool]], time: float = 0.6) -> Hold:
-    return Hold(node, time, np.array([0.7, 0.9]), np.array([0.3, -0.2]), np.array(fixed))
+    return held(node, time, [0.7, 0.9], fixed, [0.3, -0.2])
+
+
+def held(
+    node: int, time: float, q: list[float], fixed: list[list[bool]], v: Any = (0.0, 0.0)
+) -> Hold:
+    state = State(q, list(v))
+    known = np.array(q), np.array(v), np.array(fixed)
+    return Hold(node, time, *known, state, np.zeros(2), State(q))
 
 
 @pytest.mark.parametrize("order", [2, 3])
 def test_a_path_holds_what_is_fixed_and_nothing_else(order: int) -> None:
     problem = carry(order=order)
     path, fixed = problem.guess("cubic"), [[True, False], [False, True]]
-    held = holding(path, problem.grid, [hold(4, fixed)])
+    on_seam = holding(path, problem.grid, [hold(4, fixed)], ROBOT)
     q, v = path.q.copy(), path.v.copy()
     q[4, 0], v[4, 1] = 0.7, -0.2
-    np.testing.assert_array_equal(held.q, q)
-    np.testing.assert_array_equal(held.v, v)
-    np.testing.assert_array_equal(held.inner, path.inner)
-    nodes = np.concatenate([held.q[:, None], held.rates], axis=1)
+    np.testing.assert_array_equal(on_seam.q, q)
+    np.testing.assert_array_equal(on_seam.v, v)
+    np.testing.assert_array_equal(on_seam.inner, path.inner)
+    nodes = np.concatenate([on_seam.q[:, None], on_seam.rates], axis=1)
     z = regularized_nodes(nodes, problem.grid.steps)
-    np.testing.assert_allclose(held.z, z, rtol=0, atol=1e-9 * np.abs(z).max())
-    np.testing.assert_array_equal(held.z[:3], path.z[:3])
-    np.testing.assert_array_equal(held.z[5:], path.z[5:])
+    np.testing.assert_allclose(on_seam.z, z, rtol=0, atol=1e-9 * np.abs(z).max())
+    np.testing.assert_array_equal(on_seam.z[:3], path.z[:3])
+    np.testing.assert_array_equal(on_seam.z[5:], path.z[5:])
 
 
 @pytest.mark.parametrize("name", ["cubic", "minimum-jerk"])
 @pytest.mark.parametrize("order", [2, 3])
 def test_a_guess_passes_every_seam_and_its_velocity_is_continuous(order: int, name: str) -> None:
-    passing = Hold(1, 0.6, np.array([0.7, 0.9]), np.zeros(2), np.array([[True] * 2, [False] * 2]))
+    passing = held(1, 0.6, [0.7, 0.9], [[True] * 2, [False] * 2])
     stop = hold(2, [[True, True], [True, True]], time=1.0)
     jets = [np.zeros((2, 2)) for _ in range(order)]
     jets[0][1] = [1.5, 0.5]
-    curve = curve_through(name, ROBOT, jets, 1.5, [passing, stop])
+    curve = curve_through(name, ROBOT, jets, 1.5, [passing, stop], np.zeros(2))
     d = 1e-7
     for t, q in ((0.0, [0.0, 0.0]), (0.6, [0.7, 0.9]), (1.0, [0.7, 0.9]), (1.5, [1.5, 0.5])):
         np.testing.assert_allclose(curve(np.array([t]))[0][0], q, atol=1e-12)
@@ -89,9 +97,9 @@ def test_a_guess_passes_every_seam_and_its_velocity_is_continuous(order: int, na
 
 
 def test_a_free_velocity_of_a_guess_is_the_mean_one_unless_it_would_reverse() -> None:
-    passing = Hold(1, 0.5, np.array([1.0, 1.0]), np.zeros(2), np.array([[True] * 2, [False] * 2]))
+    passing = held(1, 0.5, [1.0, 1.0], [[True] * 2, [False] * 2])
     jets = [np.array([[0.0, 0.0], [3.0, -1.0]]), np.zeros((2, 2))]
-    curve = curve_through("cubic", ROBOT, jets, 1.5, [passing])
+    curve = curve_through("cubic", ROBOT, jets, 1.5, [passing], np.zeros(2))
     assert curve(np.array([0.5]))[1][0] == pytest.approx([2.0, 0.0])
 
 

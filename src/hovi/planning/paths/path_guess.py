@@ -60,7 +60,7 @@ def path_guesses(
         return
     waypoints = [*_waypoints(problem, direct.q[0]), (problem.grid.duration, direct.q[-1])]
     t = np.array([0.0, *(time for time, _ in waypoints)])
-    turns = [*np.zeros((len(waypoints) - 1, len(space.speed))), _full_turns(problem) / space.speed]
+    turns = [_full_turns(problem, time) / space.speed for time, _ in waypoints]
     with OmplProcess() as ompl:
         for k in range(count):
             paths, x = list[Array](), np.zeros(len(space.speed))
@@ -75,11 +75,14 @@ def path_guesses(
             yield problem.path(joined(pieces, t[:-1]))
 
 
-def _full_turns(problem: TrajectoryProblem) -> Array:
-    """Full turns of continuous joints beyond the shortest path, (nv,), in [rad]."""
+def _full_turns(problem: TrajectoryProblem, time: float) -> Array:
+    """Full turns of continuous joints beyond the shortest path to a waypoint, (nv,), in [rad]."""
     angles = [factor.v.start for factor in problem.coordinates.space.angles]
+    known = {each.time: each.turns for each in problem.holds}
+    known[problem.grid.duration] = problem.turns
     full = np.zeros(problem.coordinates.nv)
-    full[angles] = 2 * np.pi * problem.turns[angles]
+    if time in known:
+        full[angles] = 2 * np.pi * known[time][angles]
     return full
 
 

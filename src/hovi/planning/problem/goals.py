@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import lru_cache
+from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -48,6 +49,7 @@ class Via:
 
     time: float
     goal: State | FrameGoal
+    takes_turns: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         if isinstance(self.goal, np.ndarray | list | tuple):
@@ -61,7 +63,7 @@ class Via:
         object.__setattr__(self, "time", seconds(self.time, "the time of a via point"))
         if not (np.isfinite(self.time) and self.time > 0):
             raise InputError(f"the time of a via point must be positive, got {self.time} s.")
-        if isinstance(self.goal, State) and self.goal.turns:
+        if isinstance(self.goal, State) and self.goal.turns and not self.takes_turns:
             raise InputError("a via point takes no `turns`: set them on the goal.")
         rates = ("a", "free_acceleration", "jerk", "free_jerk")
         given = [key for key in rates if _is_given(getattr(self.goal, key, None))]

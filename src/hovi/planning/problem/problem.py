@@ -81,7 +81,8 @@ class TrajectoryProblem(ProblemSummary):
         (2, k, nv).
     equations: at nodes. holds: what is fixed where segments meet.
     unreachable: why the goal cannot be reached, or "".
-    turns: full turns of the guess beyond the shortest path, rotation vectors over 2 pi, (nv,).
+    turns: full turns of the guess beyond the shortest path, after the last seam if there are any,
+        rotation vectors over 2 pi, (nv,).
     Raises InputError, ModelError or SchemeError if the input defines no problem.
     """
 
@@ -123,9 +124,9 @@ class TrajectoryProblem(ProblemSummary):
         """Set the boundary data and the conditions at nodes, from both ends and the via points."""
         coordinates, limits = self.coordinates, self.limits
         start, at_end = first.on(coordinates, "start")[0], limits and limits.at_ends[1]
-        passed = ViaPoints.of(self.via, self.grid, coordinates, start, limits)
-        near = passed.holds[-1].q if passed.holds else start
         free = (*first.free, *(joint for scene in self.scenes for joint in scene.passive))
+        passed = ViaPoints.of(self.via, self.grid, coordinates, first, limits, free)
+        near = passed.holds[-1].q if passed.holds else start
         end = goal_state(last, "goal", coordinates, near, at_end, free)
         last_node = self.grid.intervals, float(self.grid.t[-1])
         equations = [equation(each, *last_node) for each in end.differences]
@@ -170,9 +171,10 @@ class TrajectoryProblem(ProblemSummary):
         jets = [state.jet_on(coordinates, name)[:k] for state, name in named]
         object.__setattr__(self, "ends", tuple(map(np.stack, zip(*jets, strict=True))))
         object.__setattr__(self, "free_ends", np.stack(free))
-        q0, q1 = self.ends[0]
-        stops = [q0, *(each.q for each in self.holds), q1]
-        object.__setattr__(self, "turns", turns_to(goal, start, coordinates, stops))
+        (q0, q1), last = self.ends[0], start
+        if self.holds:
+            q0, last = self.holds[-1].q, self.holds[-1].start
+        object.__setattr__(self, "turns", turns_to(goal, last, coordinates, q0, q1))
 
     @classmethod
     def of_segments(
@@ -250,7 +252,7 @@ class TrajectoryProblem(ProblemSummary):
         """A curve sampled on the grid, with the problem's data in fixed components."""
         ends = self._with_fixed(curve(np.array([0.0, self.grid.duration]))[: self.ld.k])
         path = path_on_grid(curve, self.grid, ends, self.coordinates)
-        return holding(path, self.grid, self.holds)
+        return holding(path, self.grid, self.holds, self.coordinates)
 
     def moved(self, path: DiscretePath) -> DiscretePath:
         """A path plus the cubic, or Hermite polynomial, that moves its ends to the problem's."""
@@ -262,7 +264,8 @@ class TrajectoryProblem(ProblemSummary):
         return self._moved(path, self.ends)
 
     def _moved(self, path: DiscretePath, ends: Ends) -> DiscretePath:
-        return holding(moved(path, self.grid, ends, self.coordinates), self.grid, self.holds)
+        on = self.coordinates
+        return holding(moved(path, self.grid, ends, on), self.grid, self.holds, on)
 
     def _with_fixed(self, ends: Ends) -> tuple[Array, ...]:
         """Two ends with the problem's own data in fixed components."""
@@ -272,7 +275,7 @@ class TrajectoryProblem(ProblemSummary):
         """The guess with a name; for orders other than 2 always the Hermite polynomial."""
         known = self.coordinates, self.ends, self.grid.duration
         if self.holds:
-            return self.path(curve_through(name, *known, self.holds))
+            return self.path(curve_through(name, *known, self.holds, self.turns))
         return self.path(named_curve(name, *known, self.turns))
 
     def trajectory(self, path: DiscretePath) -> Trajectory:
@@ -292,6 +295,12 @@ class TrajectoryProblem(ProblemSummary):
             metadata["space"] = list(self.coordinates.space.parts)
         none = StoredTorque.none(self.grid.intervals)
         return Trajectory(self.grid, path, momenta, None, metadata, none, turns=turns)
+
+    @property
+    def goals(self) -> tuple[State, ...]:
+        """The goals of the seams, and that of the motion if it is a State."""
+        last = (self.goal,) if isinstance(self.goal, State) else ()
+        return (*(each.goal for each in self.holds), *last)
 
     @property
     def end_velocities(self) -> Array:

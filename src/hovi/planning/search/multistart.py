@@ -309,8 +309,8 @@ def _round(
         curve = with_bump(base, robot, T, seed=seed * 100_003 + i)
         if robot.space.angles:
             turns = _random_turns(robot, seed * 100_003 + i)
-            if isinstance(problem.goal, State):
-                turns[says_turns(problem.goal, robot)] = 0.0
+            for goal in problem.goals:
+                turns[says_turns(goal, robot)] = 0.0
             curve = with_turns(curve, robot, T, turns)
         guesses.append(_on_charts(problem, curve, base))
     return guesses

@@ -194,9 +194,10 @@ def with_notes(
     """
     notes = [*_notes(found, scenes, options), *apart.cautions(found)]
     said = [each.sentence for each in notes if each.word in (LEFT_OUT, COLLISION)]
-    if found.problem is not None and isinstance(goal := found.problem.goal, State):
-        turned = turns_sentence(goal, found.problem.coordinates, found.problem.turns)
-        said += [turned] if turned else []
+    if found.problem is not None:
+        on, turns = found.problem.coordinates, [each.turns for each in found.problem.holds]
+        stops = zip(found.problem.goals, [*turns, found.problem.turns], strict=False)
+        said += filter(None, (turns_sentence(goal, on, made) for goal, made in stops))
     cautions = notes if found.success else [Caution(STATUS, found.message), *notes]
     setup = found.setup_seconds if setup_seconds is None else setup_seconds
     message = " ".join([found.message, *said])

@@ -143,5 +143,8 @@ def checked_segments(segments: Any, options: PlanOptions) -> tuple[Segment, ...]
     if options.time_weight != 0:
         raise InputError("time_weight needs a free duration, and those of segments are fixed.")
     if options.turns is not None:
-        raise InputError("a sequence takes no `turns`, since its joints make no full turns.")
+        raise InputError(
+            "a sequence takes no `turns`: give them to the goal of a segment, "
+            "hovi.State(q, turns={joint: 1})."
+        )
     return tuple(segments)

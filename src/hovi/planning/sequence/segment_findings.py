@@ -8,7 +8,9 @@ from collections.abc import Sequence
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import Grid
 from hovi.discrete.state import ALL, State
+from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.limits import Limits
+from hovi.planning.problem.notation.goal_turns import keeping_turns
 from hovi.planning.problem.presolve.findings import Findings, about_limits, slips
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.search.job import Job
@@ -24,7 +26,8 @@ def segment_findings(
     moves: of the sequence; limits are not looked at in those over several segments, nor after a
     goal that cannot be reached, which the problem itself names. limits, names: of the segments.
     """
-    reported, looked_like, before = list[str](), list[str](), _as_start(job.start)
+    reported, looked_like = list[str](), list[str]()
+    before: State | None = job.start
     for move in moves:
         number = move.numbers[0]
         if before is None:
@@ -38,7 +41,7 @@ def segment_findings(
             if found.reason:
                 reason = f"in {names[number]!r} {found.reason}"
                 return Findings(reason, (*dict.fromkeys(looked_like), *reported))
-        before = _as_start(move.goal)
+        before = _as_start(move.goal, problem)
     return Findings("", (*dict.fromkeys(looked_like), *reported))
 
 
@@ -51,13 +54,15 @@ def _alone(job: Job, move: MoveToGoal, start: State, limits: Limits) -> Trajecto
     return TrajectoryProblem(ld, start, move.goal, limits, (), clearance)
 
 
-def _as_start(goal: End) -> State | None:
+def _as_start(goal: End, problem: TrajectoryProblem) -> State | None:
     """The goal of a segment as the start of the next one, free where the target of a frame is.
 
-    None where no configuration reaches it.
+    None where no configuration reaches it. problem: of the segment, whose full turns it keeps.
     """
-    if isinstance(goal, State):
-        return goal
-    if goal.guess is None:
+    if isinstance(goal, FrameGoal) and goal.guess is None:
         return None
-    return State(goal.guess, free=(ALL,), free_velocity=tuple(goal.free_velocity))
+    known = problem.start, problem.coordinates, *problem.ends[0], problem.turns
+    q = keeping_turns(*known).q
+    if isinstance(goal, State):
+        return dataclasses.replace(goal, q=q, turns={})
+    return State(q, free=(ALL,), free_velocity=tuple(goal.free_velocity))

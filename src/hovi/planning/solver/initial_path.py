@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from functools import partial
+from itertools import pairwise
+
 import numpy as np
 import numpy.typing as npt
 
 from hovi.discrete.grid import DiscretePath
-from hovi.discrete.guess import check_path, stretched, with_turns
+from hovi.discrete.guess import Curve, check_path, joined, stretched, with_turns
 from hovi.discrete.node_continuity import require_continuous
-from hovi.discrete.state import State
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError
 from hovi.planning.problem.notation.goal_turns import says_turns, turns_after
@@ -43,31 +46,53 @@ def turned_on(problem: TrajectoryProblem, path: DiscretePath) -> DiscretePath:
         return path
     motion = problem.trajectory(path)
     turns = _turns_left(problem, motion)
-    return _turned_path(problem, motion, turns) if turns.any() else path
+    return _turned_path(problem, motion, turns) if np.any(turns) else path
 
 
-def _turned_path(problem: TrajectoryProblem, guess: Trajectory, turns: Array) -> DiscretePath:
-    """A motion on the problem's grid. turns: full turns that it makes beyond its own, (nv,)."""
-    T = problem.grid.duration
+def _turned_path(
+    problem: TrajectoryProblem, guess: Trajectory, turns: Sequence[Array]
+) -> DiscretePath:
+    """A motion on the problem's grid.
+
+    turns: full turns that it makes beyond its own up to each seam, and up to the end, (nv,) each.
+    """
+    T, on = problem.grid.duration, problem.coordinates
     curve = stretched(guess, T, problem.ld.k)
-    return problem.path(with_turns(curve, problem.coordinates, T, turns) if turns.any() else curve)
+    if not np.any(turns):
+        return problem.path(curve)
+    times = np.array([0.0, *(each.time for each in problem.holds), T])
+    pieces = [
+        with_turns(partial(_from, curve, begin), on, end - begin, more)
+        for (begin, end), more in zip(pairwise(times), turns, strict=True)
+    ]
+    return problem.path(joined(pieces, times[:-1]))
+
+
+def _from(curve: Curve, begin: float, t: Array) -> tuple[Array, ...]:
+    """A curve from a time on."""
+    return curve(begin + np.asarray(t))
 
 
 def _says_turns(problem: TrajectoryProblem) -> bool:
-    """Whether the angle of a continuous joint at the goal says its full turns."""
-    goal = problem.goal
-    return isinstance(goal, State) and bool(says_turns(goal, problem.coordinates).any())
+    """Whether the angle of a continuous joint at a goal says its full turns."""
+    return any(says_turns(goal, problem.coordinates).any() for goal in problem.goals)
 
 
-def _turns_left(problem: TrajectoryProblem, guess: Trajectory) -> Array:
-    """Full turns of continuous joints by which a guess ends too early, shape (nv,).
+def _turns_left(problem: TrajectoryProblem, guess: Trajectory) -> list[Array]:
+    """Full turns of continuous joints that a guess lacks up to each seam and the end, (nv,) each.
 
-    They are known where the angle of the goal says its turns.
+    They are known where the angle of a goal says its turns.
     """
-    start, goal, on = problem.start, problem.goal, problem.coordinates
-    if not (isinstance(goal, State) and _says_turns(problem)):
-        return np.zeros(on.nv)
-    first, last = guess.positions([0.0, guess.duration])
-    q0, q1 = problem.ends[0]
-    change = on.difference(q0, guess.q[0]) + last - first + on.difference(guess.q[-1], q1)
-    return turns_after(goal, start, on, q0, change)
+    start, on, q0, holds = problem.start, problem.coordinates, problem.ends[0][0], problem.holds
+    left = [np.zeros(on.nv) for _ in (*holds, problem.goal)]
+    if not _says_turns(problem):
+        return left
+    ratio = guess.duration / problem.grid.duration
+    t = np.array([0.0, *(ratio * each.time for each in holds), guess.duration])
+    at, q = guess.positions(t), [*(each.q for each in holds), problem.ends[0][1]]
+    begin = on.difference(q0, guess.q[0]) - at[0]
+    for i, goal in enumerate(problem.goals):
+        change = begin + at[i + 1] + on.difference(guess.configurations(t[i + 1])[0], q[i])
+        change = change + 2 * np.pi * np.sum(left, axis=0)
+        left[i] = turns_after(goal, start, on, q0, change)
+    return left

@@ -84,9 +84,9 @@ def status_of(
         reason = non_finite_sentence(problem, ended.x)
         if reason:
             return Status.DIVERGED, diverged(reason, nit)
+    saddles = dict.fromkeys(f"{value:.10g}" for value in ended.saddles)
     left = "".join(
-        f" A saddle of cost {value:.10g} was left along negative curvature."
-        for value in ended.saddles
+        f" A saddle of cost {each} was left along negative curvature." for each in saddles
     )
     if ended.why is Reason.STATIONARY and n_neg == 0:
         return (

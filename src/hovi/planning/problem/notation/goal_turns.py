@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from itertools import pairwise
-
 import numpy as np
 import numpy.typing as npt
 
 from hovi.discrete.state import MAX_TURNS, State
 from hovi.errors import InputError
 from hovi.robot.space.coordinates import Coordinates
+from hovi.robot.space.joint_table import with_angles
 from hovi.robot.space.turns import known_or, nearest_angles, remainder, turns_of
 
 Array = npt.NDArray[np.float64]
@@ -22,12 +20,12 @@ def says_turns(goal: State, on: Coordinates) -> Mask:
     return np.asarray(turns_of(goal.angles_on(on)) != 0)
 
 
-def turns_to(goal: State, start: State, on: Coordinates, stops: Sequence[Array]) -> Array:
+def turns_to(goal: State, start: State, on: Coordinates, q0: Array, q1: Array) -> Array:
     """Full turns to a goal beyond the shortest path, shape (nv,): see `State.turns_on`.
 
     Those that the goal adds, and those up to an angle beyond (-pi, pi], which says them.
-    stops: configurations (nq,) from the start to the goal. Raises InputError for a joint of which
-    both are given, and as `turns_on` does.
+    q0, q1: configurations (nq,) of both. Raises InputError for a joint of which both are given,
+    and as `turns_on` does.
     """
     added, angles, said = goal.turns_on(on, "goal"), goal.angles_on(on), says_turns(goal, on)
     if not said.any():
@@ -37,14 +35,22 @@ def turns_to(goal: State, start: State, on: Coordinates, stops: Sequence[Array])
             f"goal.turns: the goal of joint {on.joint_at(int(i))!r}, {angles[i]:g} rad, says its "
             "full turns: give an angle from -pi to pi, or leave out `turns`."
         )
-    change = np.sum([on.difference(*pair) for pair in pairwise(stops)], axis=0)
-    further = turns_after(goal, start, on, stops[0], change)
+    further = turns_after(goal, start, on, q0, on.difference(q0, q1))
     for i in np.flatnonzero(said & (abs(further) > MAX_TURNS)):
         raise InputError(
             f"the goal of joint {on.joint_at(int(i))!r}, {angles[i]:g} rad, is "
             f"{abs(further[i]):,.0f} turns away: at most {MAX_TURNS:,} are planned."
         )
     return np.asarray(np.where(said, further, added))
+
+
+def keeping_turns(start: State, on: Coordinates, q0: Array, q: Array, turns: Array) -> State:
+    """A configuration as the start of what follows, with the full turns that joints have made.
+
+    From the start, whose configuration is q0, to q the shortest way, and by `turns` beyond it.
+    """
+    first = nearest_angles(q0, known_or(start.angles_on(on), remainder(q0, on.space)), on.space)
+    return State(with_angles(q, first + on.difference(q0, q) + 2 * np.pi * turns, on))
 
 
 def turns_after(goal: State, start: State, on: Coordinates, q: Array, change: Array) -> Array:

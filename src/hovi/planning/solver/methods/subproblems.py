@@ -88,7 +88,9 @@ def _between(
     grid = Grid(whole.steps[first:last], whole.schemes[first:last])
     begin, end = float(whole.t[first]), float(whole.t[last])
     ld = DiscreteLagrangian(_lagrangian(problem.ld.lagrangian, begin, end), grid)
-    start = State(held[first].q, held[first].v) if first in held else problem.start
+    start = problem.start
+    if first in held:
+        start = dataclasses.replace(held[first].start, v=held[first].v)
     goal = State(held[last].q, held[last].v) if last in held else problem.goal
     via = tuple(
         dataclasses.replace(each, time=each.time - begin)

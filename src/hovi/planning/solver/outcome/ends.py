@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from hovi.discrete.grid import DiscretePath
-from hovi.discrete.state import State
 from hovi.discrete.trajectory import Trajectory
 from hovi.planning.conditions.condition import missed
 from hovi.planning.problem.conditions_of import ends_of
@@ -27,10 +24,12 @@ def misses(problem: TrajectoryProblem, path: DiscretePath) -> str:
 
 
 def turns_missed_by(problem: TrajectoryProblem, motion: Trajectory) -> str:
-    """By how many full turns a motion ends away from its goal, as a clause; "" if by none."""
-    goal, on = problem.goal, problem.coordinates
-    if not isinstance(goal, State) or not on.space.angles:
+    """By how many full turns a motion is away from a goal, as a clause; "" if by none."""
+    on, at_ends = problem.coordinates, problem.free_ends[:, 0]
+    if not on.space.angles:
         return ""
-    free = np.asarray(problem.free_ends[:, 0].any(axis=0))
-    clause = turns_missed(goal, on, motion.positions(motion.duration)[0], free)
+    free = [at_ends[0] | ~each.fixed[0] for each in problem.holds] + [at_ends.any(axis=0)]
+    times = [*(each.time for each in problem.holds), motion.duration]
+    stops = zip(problem.goals, motion.positions(times), free, strict=False)
+    clause = next(filter(None, (turns_missed(x, on, q, left) for x, q, left in stops)), "")
     return clause and f"the motion {clause}"
