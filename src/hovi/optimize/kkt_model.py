@@ -36,18 +36,20 @@ Index = npt.NDArray[np.intp]
 X = TypeVar("X")
 
 DELTA = 1e-8
-"""delta, relative to |A|^2 / |H|."""
+"""delta, relative to |A|^2 / |H|, where |A| is that of a family of equations."""
 
 
 @dataclass(frozen=True, eq=False)
 class ConstraintRows:
     """Jacobian of E constraints of each of B intervals, in their first columns.
 
-    index: of the intervals. slopes: shape (B, E, m, n).
+    index: of the intervals. slopes: shape (B, E, m, n). families: of the constraints of an
+        interval, shape (E,): those of one number are of one size, in all rows of a model.
     """
 
     index: Index | slice
     slopes: Array
+    families: Index | None = None
 
     @cached_property
     def flat(self) -> Array:
@@ -182,8 +184,8 @@ class KktFactor:
     """L S L^T of [H + shift D, A^T; A, -delta I].
 
     negative: number of negative signs; -1 where there is no factor. delta: what refinement removes,
-    0 where delta belongs to the system to solve. rho: of rho A^T A in the matrix, which changes the
-    multipliers alone.
+    by equation; None where delta belongs to the system to solve. rho: of A^T diag(rho) A in the
+    matrix, which changes the multipliers alone.
     """
 
     def __init__(
@@ -192,8 +194,8 @@ class KktFactor:
         matrix: Array,
         metric: Array,
         shift: float,
-        delta: float,
-        rho: float,
+        delta: Array | None,
+        rho: Array | float,
     ) -> None:
         self.layout, self.matrix, self.metric, self.shift = layout, matrix, metric, shift
         self.delta, self.rho = delta, rho
@@ -210,7 +212,7 @@ class KktFactor:
         rhs = np.empty(at.size)
         rhs[at.unknowns], rhs[at.multipliers] = force, target
         x = self._solved(rhs)
-        if self.delta > 0.0:
+        if self.delta is not None:
             x = x + self._solved(rhs - self._product(x))
         return x[at.unknowns], x[at.multipliers] + self.rho * target
 
@@ -221,6 +223,7 @@ class KktFactor:
 
     def _product(self, x: Array) -> Array:
         """The product with the matrix for delta = 0."""
+        assert self.delta is not None
         product, shifted = np.empty_like(x), np.empty_like(x)
         rows, at = self.layout.profile, self.layout.multipliers
         native.product(self.matrix, rows, x, product)
@@ -262,11 +265,13 @@ class KktModel:
 
     @cached_property
     def _regular(self) -> Array:
-        """The matrix with H + rho A^T A in place of H."""
-        hessian = self.plain.intervals.hessian.copy()
+        """The matrix with H + A^T diag(rho) A in place of H."""
+        hessian, first = self.plain.intervals.hessian.copy(), 0
         for each in self.rows:
-            B, _, m, n = each.slopes.shape
-            product = np.matmul(each.flat.transpose(0, 2, 1), each.flat / self._scale)
+            B, E, m, n = each.slopes.shape
+            scale = self._scale[first : first + each.size].reshape(B, E, 1)
+            first += each.size
+            product = np.matmul(each.flat.transpose(0, 2, 1), each.flat / scale)
             blocks = product.reshape(B, m, n, m, n).transpose(0, 1, 3, 2, 4)
             hessian[each.index, :m, :m] += blocks
         return self.layout.matrix(hessian, self.rows)
@@ -290,10 +295,20 @@ class KktModel:
         return max(float(np.max(np.abs(each.slopes), initial=0.0)) for each in self.rows)
 
     @cached_property
-    def _scale(self) -> float:
-        """|A|^2 / |H|, which is 1 / rho."""
-        largest = float(np.max(np.abs(self.plain.intervals.hessian), initial=0.0))
-        return (self._largest_slope**2 / largest if largest > 0.0 else 0.0) or 1.0
+    def _scale(self) -> Array:
+        """|A|^2 / |H| of the family of every equation, which is 1 / rho, shape (E,)."""
+        families, sizes = [], []
+        for each in self.rows:
+            B, E = each.slopes.shape[:2]
+            own = np.zeros(E, np.intp) if each.families is None else each.families
+            families.append(np.tile(own, B))
+            sizes.append(np.abs(each.flat).max(axis=2, initial=0.0).ravel())
+        known = np.concatenate(families)
+        largest = np.zeros(int(known.max(initial=0)) + 1)
+        np.maximum.at(largest, known, np.concatenate(sizes))
+        curvature = float(np.max(np.abs(self.plain.intervals.hessian), initial=0.0))
+        scale = largest**2 / curvature if curvature > 0.0 else np.zeros_like(largest)
+        return np.where(scale > 0.0, scale, 1.0)[known]
 
     def factor(self, shift: float, delta: float | None = None) -> KktFactor | None:
         """The factor; None where H + shift D is not positive definite on A s = 0.
@@ -309,8 +324,10 @@ class KktModel:
 
     def normal_factor(self, damping: float, delta: float | None = None) -> KktFactor:
         """As `factor`, with damping D in place of H + shift D."""
-        small = DELTA * self._scale if delta is None else 0.0
-        return self._factored(self._rows_alone, damping, small or delta or 0.0, small)
+        if delta is not None:
+            return self._factored(self._rows_alone, damping, delta)
+        small = DELTA * self._scale
+        return self._factored(self._rows_alone, damping, small, small)
 
     def _without_delta(self, shift: float, delta: float = DELTA) -> KktFactor:
         """The factor for solutions from which refinement removes delta |A|^2 / |H|."""
@@ -318,7 +335,12 @@ class KktModel:
         return self._factored(self._regular, shift, small, small, 1.0 / self._scale)
 
     def _factored(
-        self, band: Array, shift: float, delta: float, removed: float = 0.0, rho: float = 0.0
+        self,
+        band: Array,
+        shift: float,
+        delta: Array | float,
+        removed: Array | None = None,
+        rho: Array | float = 0.0,
     ) -> KktFactor:
         matrix = band.copy()
         matrix.ravel()[self.layout.corners] = -delta

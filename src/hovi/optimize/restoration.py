@@ -1,7 +1,8 @@
 """Restoration: steps that make the residual |c| of equations smaller, whatever the objective does.
 
 Damped Gauss-Newton steps -(A^T A + damping D)^-1 A^T c, until |c| has become a tenth or has a
-stationary point that is not zero. [NocedalWright2006, section 10.3]
+stationary point that is not zero. Once such a step has failed, the curvature
+sum c_i d2 c_i is added to A^T A. [NocedalWright2006, section 10.3]
 """
 
 from __future__ import annotations
@@ -54,6 +55,7 @@ def restore(
         if not objective.feasible(start.x):
             ended.why = Reason.INFEASIBLE
         return ended
+    step_of = _step
     while len(ended.steps) < min(criteria.max_iterations, MAX_STEPS):
         raise_if_interrupted()
         raise_if_late()
@@ -61,9 +63,9 @@ def restore(
         if size <= RESTORED * first or objective.feasible(ended.x):
             ended.why = Reason.STATIONARY
             break
-        step, predicted = _step(model, ended.outputs.y, damping)
+        step, predicted = step_of(objective, ended, model, damping)
         if predicted < STUCK_DECREASE * size:
-            step, predicted = _step(model, ended.outputs.y, STUCK_DAMPING)
+            step, predicted = step_of(objective, ended, model, STUCK_DAMPING)
             if predicted < STUCK_DECREASE * size:
                 lowest = _is_lowest(objective, ended, model)
                 ended.why = Reason.INFEASIBLE if lowest else Reason.STALLED
@@ -82,26 +84,50 @@ def restore(
             model = objective.model(x, none)
         else:
             damping *= 10.0
+            step_of = _newton_step
     ended.z = model.least_squares_multipliers()
     return ended
 
 
 def _is_lowest(objective: EqualityObjective[X], ended: Ended[X, Array], model: KktModel) -> bool:
-    """Whether |c|^2 has a minimum at a stationary point, by its Hessian A^T A + sum c_i d2 c_i.
-
-    The Hessian of f, which the model contains as well, is outweighed.
-    """
-    weight = OUTWEIGHING * max(model.curvature_scale / model.normal_scale, 1.0)
-    there = objective.model(ended.x, weight * ended.outputs.y)
+    """Whether |c|^2 has a minimum at a stationary point, by its Hessian A^T A + sum c_i d2 c_i."""
+    weight, there = _with_curvature(objective, ended, model)
     shift = FLATNESS * weight * model.normal_scale
     return there.factor(shift, 1.0 / weight) is not None
 
 
-def _step(model: KktModel, residual: Array, damping: float) -> tuple[Array, float]:
-    """A step and the decrease of |c| that it predicts."""
-    none = np.zeros(model.layout.plain.size)
+def _with_curvature(
+    objective: EqualityObjective[X], ended: Ended[X, Array], model: KktModel
+) -> tuple[float, KktModel]:
+    """w and the model of w c.c / 2: the Hessian of f, which it contains as well, is outweighed."""
+    weight = OUTWEIGHING * max(model.curvature_scale / model.normal_scale, 1.0)
+    return weight, objective.model(ended.x, weight * ended.outputs.y)
+
+
+def _step(
+    objective: EqualityObjective[X], ended: Ended[X, Array], model: KktModel, damping: float
+) -> tuple[Array, float]:
+    """A Gauss-Newton step and the decrease of |c| that it predicts."""
+    c, none = ended.outputs.y, np.zeros(model.layout.plain.size)
     factor = model.normal_factor(damping * model.normal_scale, 1.0)
-    step, _ = factor.solve(none, -residual)
+    step, _ = factor.solve(none, -c)
     if not np.isfinite(step).all():
         raise ArithmeticError("the Jacobian of the equations has non-finite entries")
-    return step, size_of(residual) - size_of(residual + model.jacobian_product(step))
+    return step, size_of(c) - size_of(c + model.jacobian_product(step))
+
+
+def _newton_step(
+    objective: EqualityObjective[X], ended: Ended[X, Array], model: KktModel, damping: float
+) -> tuple[Array, float]:
+    """As `_step`, with the curvature of c where A^T A with it is positive definite.
+
+    Gauss-Newton steps are too long, or many, near a minimum of |c| that is not zero.
+    """
+    weight, there = _with_curvature(objective, ended, model)
+    factor = there.factor(damping * weight * model.normal_scale, 1.0 / weight)
+    if factor is None:
+        return _step(objective, ended, model, damping)
+    c = ended.outputs.y
+    step, _ = factor.solve(np.zeros(model.layout.plain.size), -c)
+    square = size_of(c + model.jacobian_product(step)) ** 2 + there.curvature(step) / weight
+    return step, size_of(c) - math.sqrt(max(square, 0.0))

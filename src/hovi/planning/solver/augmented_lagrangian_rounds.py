@@ -9,7 +9,7 @@ import numpy as np
 
 from hovi.discrete.grid import DiscretePath
 from hovi.optimize.ended import Ended, Reason
-from hovi.planning.conditions.condition import describe, is_spurious, whose
+from hovi.planning.conditions.condition import Equation, describe, is_spurious, whose
 from hovi.planning.problem.conditions_of import passive_joints
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.action_objective import ActionObjective
@@ -151,9 +151,27 @@ def unmet_sentence(problem: TrajectoryProblem, path: DiscretePath, residuals: Re
             f"remaining torque is {residuals.torque_fraction:.3g} of the largest; allow more time "
             "or change the goal"
         )
-    sizes = [float(np.max(np.abs(c), initial=0.0)) for c in residuals.nodes]
-    worst = problem.equations[int(np.argmax(sizes))]
+    worst = _worst(problem, residuals)
     return (
         f"{whose(worst)} at t = {worst.where.time:.4g} s cannot be met: {describe(worst, path)}; "
         "change the goal, increase the duration or try another initial guess"
     )
+
+
+def missed_sentence(problem: TrajectoryProblem, path: DiscretePath) -> str:
+    """What the motion of an unfinished solve misses, a sentence after a space; "" for nothing."""
+    residuals = ActionObjective(problem).residuals(path)
+    if within(residuals, FEASIBLE_RESIDUAL, FEASIBLE_RESIDUAL):
+        return ""
+    if residuals.torque_fraction > FEASIBLE_RESIDUAL or not problem.equations:
+        fraction, joint = residuals.torque_fraction, passive_joints(problem)
+        return f" So far, the torque at passive joint {joint} is {fraction:.3g} of the largest."
+    worst = _worst(problem, residuals)
+    where = f"{whose(worst)} at t = {worst.where.time:.4g} s"
+    return f" So far, {where} is missed: {describe(worst, path)}."
+
+
+def _worst(problem: TrajectoryProblem, residuals: Residuals) -> Equation:
+    """The condition at a node that is missed most."""
+    sizes = [float(np.max(np.abs(c), initial=0.0)) for c in residuals.nodes]
+    return problem.equations[int(np.argmax(sizes))]

@@ -30,6 +30,7 @@ class Equations:
         self.problem, self.node_scale = problem, node_scale
         passive = problem.passive
         self.moments = TorqueMoments.everywhere(problem.ld, passive) if len(passive) > 0 else None
+        self.passive_joints = _joints_of(problem) if len(passive) > 0 else passive
         self._known: tuple[KktLayout, Array] | None = None
 
     def residual(self, x: DiscretePath, outputs: list[Array]) -> Array:
@@ -41,11 +42,16 @@ class Equations:
         return np.concatenate(parts)
 
     def rows(self, x: DiscretePath, expansion: Expansion) -> list[ConstraintRows]:
-        """Their Jacobian in nodal columns; expansion: of a discrete Lagrangian at the path."""
+        """Their Jacobian in nodal columns; expansion: of a discrete Lagrangian at the path.
+
+        Those of each passive joint, and those of all conditions, are a family.
+        """
         rows = []
         if self.moments is not None:
             for i, batch in enumerate(self.problem.ld.batches):
-                rows.append(ConstraintRows(batch.index, self.moments.scaled_slopes(expansion, i)))
+                slopes = self.moments.scaled_slopes(expansion, i)
+                families = np.resize(self.passive_joints, slopes.shape[1])
+                rows.append(ConstraintRows(batch.index, slopes, families))
         for each in self.problem.equations:
             k, columns, scale = self.place(each.where.node)
             _, J = linear_at(each, *each.where.state(x))  # (s, 2, n)
@@ -82,3 +88,9 @@ class Equations:
             nodes.append(self.node_scale * y[first:last])
             first = last
         return torque, nodes
+
+
+def _joints_of(problem: TrajectoryProblem) -> npt.NDArray[np.intp]:
+    """The number of the joint of every passive coordinate, from 1."""
+    firsts = [joint.idx_v for joint in problem.scene.model.joints[1:]]
+    return np.searchsorted(firsts, problem.passive, side="right")

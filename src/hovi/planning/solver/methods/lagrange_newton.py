@@ -21,8 +21,8 @@ from hovi.planning.solver.augmented_lagrangian_rounds import (
     FEASIBLE_RESIDUAL,
     FIRST_DECREASE,
     WARM_TORQUE_FRACTION,
-    are_met,
     first_multipliers,
+    missed_sentence,
     spurious_sentence,
     unmet_sentence,
     within,
@@ -159,17 +159,15 @@ def _status(
     status, message = status_of(problem, ended, cost, nit, n_neg)
     if status is Status.MINIMUM:
         return status, message
-    residuals = ActionObjective(problem).residuals(ended.x)
-    if are_met(residuals):
-        return status, message
-    sentence = unmet_sentence(problem, ended.x, residuals)
-    return status, f"{message} So far, {sentence.partition(';')[0]}."
+    return status, message + missed_sentence(problem, ended.x)
 
 
 def _negative_eigenvalues(objective: ConstrainedAction, found: Ended[DiscretePath, Array]) -> int:
-    """n_neg on the tangent space of the equations; -1 if time runs out."""
+    """n_neg on the tangent space of the equations; -1 unless stationary, or if time runs out."""
     if found.convex:
         return 0
+    if found.why is not Reason.STATIONARY:
+        return -1
     try:
         return objective.model(found.x, found.z).negative_eigenvalues()
     except OutOfTimeError:
