@@ -10,6 +10,7 @@ import pinocchio as pin
 import pytest
 
 import hovi
+from hovi.discrete.state import State
 from hovi.errors import InputError
 from hovi.planning.problem.conserved_momentum import (
     falls_freely,
@@ -202,5 +203,60 @@ def test_only_what_follows_from_the_momenta_is_freed(
     expected[1, 0, :3] |= not turn_free
     expected[1, 1, :6] |= freed == "velocity"
     np.testing.assert_array_equal(found, expected)
-    free[0, 0, 0] = True  # a free start
+    free[0, 0, 0] = True  # a free start, whose momenta are known at rest
+    expected = free.copy()
+    expected[1, 1, :6] |= freed == "velocity" and not moving
+    np.testing.assert_array_equal(without_redundancy(scene, ([], [v, v]), free), expected)
+    free[0, 1, 0] = True
     np.testing.assert_array_equal(without_redundancy(scene, ([], [v, v]), free), free)
+
+
+def in_segments(stop: State, goal: State, mass: float) -> hovi.Solution:
+    """The spacecraft moves its arm, takes a mass if it is not 0, and moves on."""
+    task = spacecraft()
+    load = [hovi.effects.Payload(frame=task.scene.robot.tip_frame, mass=mass)] if mass else []
+    segments = [hovi.Segment(stop, 0.8), hovi.Segment(goal, 0.9, effects=load)]
+    options = {"limits": "none", "self_collision": False, "intervals": 32, "continuation": False}
+    return hovi.plan_sequence(task.scene, task.start, segments, **options)
+
+
+def arm_at(angles: list[float]) -> np.ndarray:
+    q = np.array(spacecraft().start.on(spacecraft().scene.robot, "start")[0])
+    q[7:] = angles
+    return q
+
+
+BASE = {"free": ("root_joint",), "free_velocity": ("root_joint",)}
+
+
+@pytest.mark.parametrize("mass", [0.0, 5.0])
+def test_a_goal_from_which_a_mass_was_taken_along_is_compared_with_the_segment_s_momenta(
+    mass: float,
+) -> None:
+    """Where the base is left by a motion is a goal that it can reach, with the load or without."""
+    arms = [0.5, -0.4, 0.3], [0.2, 0.9, -0.5]
+    found = in_segments(State(arm_at(arms[0]), **BASE), State(arm_at(arms[1]), **BASE), mass)
+    assert found.success, found.message
+    motion = found.trajectory
+    node = int(np.argmin(np.abs(motion.t - 0.8)))
+    v = motion.v[node]
+    assert np.abs(v).max() < 1e-8
+    stop, goal = State(motion.q[node]), State(motion.q[-1])
+    again = in_segments(State(arm_at(arms[0]), **BASE), goal, mass)
+    assert again.problem is not None
+    assert again.problem.unreachable == ""
+    reached = in_segments(stop, State(arm_at(arms[1]), **BASE), mass)
+    assert reached.problem is not None
+    assert reached.problem.unreachable == ""
+    assert reached.cost == pytest.approx(found.cost, rel=1e-6)
+    hold = reached.problem.holds[0]
+    np.testing.assert_array_equal(hold.fixed[0], [False] * 3 + [True] * 6)
+    np.testing.assert_array_equal(hold.fixed[1], [False] * 6 + [True] * 3)
+
+
+def test_a_seam_at_which_the_center_of_mass_would_have_moved_is_refused() -> None:
+    q = arm_at([0.5, -0.4, 0.3])
+    q[0] += 1.0
+    found = in_segments(State(q), State(arm_at([0.2, 0.9, -0.5]), **BASE), 0.0)
+    assert found.status is hovi.Status.INFEASIBLE
+    assert "joint torques cannot move the center of mass" in found.message

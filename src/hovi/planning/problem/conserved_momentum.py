@@ -7,6 +7,8 @@ constant. A goal that prescribes these as well is redundant or infeasible.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import casadi as ca
 import numpy as np
 import numpy.typing as npt
@@ -22,6 +24,26 @@ Mask = npt.NDArray[np.bool_]
 
 MOMENTUM_TOLERANCE = 1e-6
 """Relative tolerance for the agreement of a goal with the conserved quantities."""
+
+
+@dataclass(frozen=True, eq=False)
+class Stop:
+    """What is given of a motion at a time, in [s]: q, v, and which of them are free, (2, nv)."""
+
+    time: float
+    q: Array
+    v: Array
+    free: Mask
+
+    @property
+    def given(self) -> bool:
+        """Whether nothing is free."""
+        return not self.free.any()
+
+    @property
+    def at_rest(self) -> bool:
+        """Whether the velocity is given as zero, so that the momenta are zero."""
+        return not self.v.any() and not self.free[1].any()
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,17 +82,64 @@ def after_free_fall(scene: Scene, start: CentroidalState, duration: float) -> Ce
     return CentroidalState(center, start.linear + mass * g * T, start.angular)
 
 
+def kept_in_free_fall(
+    scenes: Sequence[Scene], ends: Sequence[float], stops: Sequence[Stop]
+) -> tuple[str, list[Mask]]:
+    """Why no joint torques take a robot from stop to stop, or "", and what is free at each.
+
+    Redundant components of the base are freed: see `without_redundancy`.
+    scenes: of the segments. ends: of all segments but the last, in [s]. stops: the start, the
+    seams, and the goal.
+    """
+    reason, free = "", [stop.free for stop in stops]
+    for i, stop in enumerate(stops):
+        for before in _last_known(stops[:i]):
+            scene = _falling_between(scenes, ends, before.time, stop.time)
+            if scene is not None:
+                jets = np.stack([before.q, stop.q]), np.stack([before.v, stop.v])
+                both, T = np.stack([before.free, stop.free]), stop.time - before.time
+                reason = reason or free_fall_contradiction(scene, jets, both, T)
+                free[i] = free[i] | without_redundancy(scene, jets, both)[1]
+    return reason, free
+
+
+def _last_known(stops: Sequence[Stop]) -> list[Stop]:
+    """The last stop of which all is given, and the last one at rest."""
+    given = next((stop for stop in reversed(stops) if stop.given), None)
+    rest = next((stop for stop in reversed(stops) if stop.at_rest), None)
+    return [stop for stop in dict.fromkeys((given, rest)) if stop is not None]
+
+
+def _falling_between(
+    scenes: Sequence[Scene], ends: Sequence[float], begin: float, end: float
+) -> Scene | None:
+    """The scene of a free fall between two times; None if masses or gravity change on the way."""
+    least = 1e-9 * end
+    first = int(np.searchsorted(np.array(ends), begin + least))
+    last = int(np.searchsorted(np.array(ends), end - least))
+    between = scenes[first : last + 1]
+    falls = all(falls_freely(each) and _falls_as(each, between[0]) for each in between)
+    return between[0] if falls else None
+
+
+def _falls_as(one: Scene, other: Scene) -> bool:
+    """Whether two scenes of a robot have the same masses and the same gravity."""
+    a, b = one.model, other.model
+    return a is b or (list(a.inertias) == list(b.inertias) and a.gravity == b.gravity)
+
+
 def free_fall_contradiction(scene: Scene, ends: Ends, free: Mask, duration: float) -> str:
     """Why no joint torques take a free-falling robot from one state to another, or "".
 
     ends: (q, v) at both. free: which of (q, v) are free at both ends, shape (2, 2, nv).
     """
-    if not falls_freely(scene) or free[0].any():
-        return ""
     (q0, q1), (v0, v1) = ends[:2]
+    given = not free[0].any()
+    if not (given or _at_rest(v0, free[0])) or not falls_freely(scene):
+        return ""
     expected = after_free_fall(scene, centroidal_state(scene, q0, v0), duration)
     base = scene.robot.joint_names[0]
-    if not free[1, 0].any():
+    if given and not free[1, 0].any():
         gap = float(np.linalg.norm(centroidal_state(scene, q1, v1).center - expected.center))
         if gap > MOMENTUM_TOLERANCE * (1.0 + float(np.linalg.norm(expected.center))):
             return (
@@ -78,7 +147,7 @@ def free_fall_contradiction(scene: Scene, ends: Ends, free: Mask, duration: floa
                 f"the goal's is {gap:.4g} m from where free fall takes it; leave the goal's base "
                 "position free"
             )
-    if not free[1, 0, 3:].any() or _at_rest(v1, free):
+    if not free[1, 0, 3:].any() or _at_rest(v1, free[1]):
         return _momentum_contradiction(scene, q1, v1, free[1, 1], expected, base)
     return ""
 
@@ -88,22 +157,24 @@ def without_redundancy(scene: Scene, ends: Ends, free: Mask) -> Mask:
 
     ends, free: as above.
     The base's position is redundant if all else of the goal's configuration is fixed, and its
-    velocity if all joint rates are. Redundant equations would have no unique multipliers.
+    velocity if all joint rates are. Redundant equations would have no unique multipliers. A start
+    whose configuration is free has momenta that are known if it is at rest.
     """
-    if not falls_freely(scene) or free[0].any():
+    given = not free[0].any()
+    if not (given or _at_rest(ends[1][0], free[0])) or not falls_freely(scene):
         return free
     freed = free.copy()
-    if not free[1, 0].any():
+    if given and not free[1, 0].any():
         freed[1, 0, :3] = True
-    known = not free[1, 0, 3:].any() or _at_rest(ends[1][1], free)
+    known = not free[1, 0, 3:].any() or _at_rest(ends[1][1], free[1])
     if known and not free[1, 1, 6:].any():
         freed[1, 1, :6] = True
     return freed
 
 
-def _at_rest(v1: Array, free: Mask) -> bool:
-    """Whether the goal's velocity is prescribed as zero, so that its momenta are zero."""
-    return not v1.any() and not free[1, 1].any()
+def _at_rest(v: Array, free: Mask) -> bool:
+    """Whether a velocity is prescribed as zero, so that the momenta are zero. free: of (q, v)."""
+    return not v.any() and not free[1].any()
 
 
 def _momentum_contradiction(

@@ -26,7 +26,7 @@ from hovi.planning.clearance.distances import Distances
 from hovi.planning.clearance.within_reach import distances_within_reach, with_gaps
 from hovi.planning.conditions.asked import asked_at_nodes, bounded_of, checked, require_ranges
 from hovi.planning.conditions.condition import Condition, Equation, Inequality, equation
-from hovi.planning.problem.conserved_momentum import free_fall_contradiction, without_redundancy
+from hovi.planning.problem.conserved_momentum import Stop, kept_in_free_fall
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.goals import Via, goal_state
 from hovi.planning.problem.hessian_structure import ActionStructure
@@ -137,10 +137,7 @@ class TrajectoryProblem(ProblemSummary):
         self._set_ends(first, end.state)
         require_free(asked, self)
         if self.about_robot and not self.periodic and self.ld.k > 1:
-            known = self.scene, self.ends, self.free_ends
-            unreachable = unreachable or free_fall_contradiction(*known, self.grid.duration)
-            independent = without_redundancy(self.scene, self.ends, self.free_ends)
-            object.__setattr__(self, "free_ends", independent)
+            unreachable = unreachable or self._leave_out_what_is_conserved()
         if limits is not None and limits.bounded.any() and not self.periodic:
             excused, refused = led_back(self.end_state(0), limits.strict)
             unreachable = unreachable or refused
@@ -150,6 +147,22 @@ class TrajectoryProblem(ProblemSummary):
         if self.clearance is not None:  # raises for missing collision shapes
             ends = self.ends[0], self.free_ends, self.grid.duration
             object.__setattr__(self, "clearance", with_gaps(self.robot, self.clearance, *ends))
+
+    def _leave_out_what_is_conserved(self) -> str:
+        """Free what conserved momenta imply at seams and the goal; why they forbid these, or ""."""
+        (q0, q1), (v0, v1) = self.ends[:2]
+        inner = [Stop(each.time, each.q, each.v, ~each.fixed) for each in self.holds]
+        start, goal = Stop(0.0, q0, v0, self.free_ends[0][:2]), self.free_ends[1]
+        stops = [start, *inner, Stop(self.grid.duration, q1, v1, goal[:2])]
+        lagrangian = self.ld.lagrangian
+        ends = lagrangian.ends if isinstance(lagrangian, SegmentedLagrangian) else ()
+        reason, free = kept_in_free_fall(self.scenes, ends, stops)
+        freed = np.stack([self.free_ends[0], np.concatenate([free[-1], goal[2:]])])
+        object.__setattr__(self, "free_ends", freed)
+        pairs = zip(self.holds, free[1:], strict=False)
+        holds = tuple(dataclasses.replace(each, fixed=~left) for each, left in pairs)
+        object.__setattr__(self, "holds", holds)
+        return reason
 
     def end_state(self, end: int) -> EndState:
         """The start, 0, or the goal, 1, with its limits."""

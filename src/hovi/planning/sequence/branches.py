@@ -70,7 +70,7 @@ def chosen_branches(
 ) -> tuple[State, list[End]]:
     """The start as a state, and the goals with the branch in which each is reached as their guess.
 
-    lagrangian: of the whole sequence, for joints with nq = nv. start: whose goal the start is.
+    lagrangian: of the whole sequence. start: whose goal the start is.
     Goals that cannot be reached stay as they are.
     Raises UnreachableError for a start that cannot be reached.
     """
