@@ -17,9 +17,6 @@ REFUSED = {
     ("free duration", "moving obstacle"),
     ("free duration", "segments"),
     ("free duration", "time-dependent effect"),
-    ("moving obstacle", "advance"),
-    ("segments", "advance"),
-    ("time-dependent effect", "advance"),
 }
 """The pairs that hovi refuses, in the order of FEATURES: leave out the one that no longer is."""
 

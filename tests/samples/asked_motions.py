@@ -179,12 +179,7 @@ REFUSED: tuple[tuple[str, str, str, str], ...] = (
         for name in ("two_link", "moving base", "passive")
     ),
     *((*timed, "duration", "free") for timed in (("robot", "moving base"), ("effect", "rolling"))),
-    *((*timed, "call", "advance") for timed in (("robot", "moving base"), ("effect", "rolling"))),
-    *(
-        ("world", "moving obstacle", *other)
-        for other in (("call", "advance"), ("duration", "free"))
-    ),
-    ("goal", "segments", "call", "advance"),
+    ("world", "moving obstacle", "duration", "free"),
 )
 """Pairs of values that are refused, whatever the others are."""
 LEFT_OUT: set[Pair] = {frozenset([(a, x), (b, y)]) for a, x, b, y in REFUSED}

@@ -50,6 +50,7 @@ class CasadiLagrangian(Lagrangian):
         self.expression = expression
         self._space = space
         self.time, self.scene = time, scene
+        self._own, self._begin = expression, 0.0  # before `within`
         nothing = ca.SX(0, 1)
         symbols = jet[0], ca.vertcat(*jet[1:]), nothing, nothing
         hessian, gradient = tangent.hessian(expression, symbols, space)
@@ -81,6 +82,17 @@ class CasadiLagrangian(Lagrangian):
     def timed(self) -> bool:
         """Whether L depends on time."""
         return self.time is not None
+
+    def within(self, begin: float, end: float) -> CasadiLagrangian:
+        """The same by a clock that starts at `begin`, in [s], as its scene."""
+        scene = None if self.scene is None else self.scene.from_time(begin)
+        if scene is self.scene and (self.time is None or begin == 0.0):
+            return self
+        own, total = self._own, self._begin + begin
+        shifted = own if self.time is None else ca.substitute(own, self.time, self.time + total)
+        later = CasadiLagrangian(self.jet, shifted, self._space, time=self.time, scene=scene)
+        later._own, later._begin = own, total
+        return later
 
     def value(self, *jet: Array, t: Array | None = None) -> Array:
         """L at P points, shape (P,)."""

@@ -51,9 +51,10 @@ def _bounds_of(scene: Scene, effect: Effect) -> list[EffectBounds]:
         (t, ca.SX(1)),
     ]
     found = []
-    for is_torque, term in terms:
-        if term is None:
+    for is_torque, own in terms:
+        if own is None:
             continue
+        term = scene.terms.at_times(own)
         value = Enclosure(ca.Function("value", [q, v, a, tau, t], [ca.densify(term)]))
         if value.bends:
             along = sum(ca.jtimes(term, x, dx) for x, dx in rates)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Protocol
+from typing import Protocol, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -31,6 +31,12 @@ class EffortScene(Protocol):
     @property
     def terms(self) -> SceneTerms:
         """The contributions of its effects."""
+
+    def from_time(self, time: float) -> Self:
+        """The scene by a clock that starts at a time, in [s]."""
+
+    def effort(self, weight: Array) -> EffortLagrangian:
+        """Its effort; weight: R."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,6 +83,11 @@ class EffortLagrangian(Lagrangian):
     def timed(self) -> bool:
         """Whether an effect depends on time."""
         return bool(self.scene.terms.timed)
+
+    def within(self, begin: float, end: float) -> EffortLagrangian:
+        """The same of the scene by a clock that starts at `begin`, in [s]."""
+        later = self.scene.from_time(begin)
+        return self if later is self.scene else later.effort(self.weight)
 
     @property
     def output_weight(self) -> Array:

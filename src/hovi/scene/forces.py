@@ -114,10 +114,10 @@ def resistance_of(scene: Scene) -> ca.SX | None:
             parts.append(_coadjoint(scene, momentum))
     if np.any(scene.model.armature):
         parts.append(_coadjoint(scene, ca.DM(np.array(scene.model.armature)) * v))
-    if scene.terms.symbols.base is not None:
+    if scene.terms.base is not None:
         # M(q) does not depend on the base: the difference at zero acceleration is exact
         still = ca.SX.zeros(a.shape)
-        parts.append(inverse_dynamics(scene.model, scene.terms.symbols.base, q, v, still, t))
+        parts.append(inverse_dynamics(scene.model, scene.terms.base, q, v, still, t))
         parts.append(-inverse_dynamics(scene.model, None, q, v, still, t))
     total = sum(parts[1:], parts[0]) if parts else None
     return None if total is None or ca.SX(total).is_zero() else total

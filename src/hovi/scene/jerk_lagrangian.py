@@ -81,6 +81,11 @@ class JerkLagrangian(Lagrangian):
         """Whether an effect depends on time."""
         return self.effort.timed
 
+    def within(self, begin: float, end: float) -> JerkLagrangian:
+        """The same of the scene by a clock that starts at `begin`, in [s]."""
+        effort = self.effort.within(begin, end)
+        return self if effort is self.effort else replace(self, effort=effort)
+
     @property
     def output_weight(self) -> Array:
         """R of the torques, and zero for their rates."""

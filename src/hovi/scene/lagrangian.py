@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from hovi.errors import InputError
 from hovi.robot.space.configuration_space import ConfigurationSpace
 from hovi.robot.space.coordinates import Coordinates, NamedCoordinates
 from hovi.system.dataclass import dataclass
@@ -101,6 +102,18 @@ class Lagrangian(ABC):
     def timed(self) -> bool:
         """Whether L depends on time."""
         return False
+
+    def within(self, begin: float, end: float) -> Lagrangian:
+        """L of the part of a motion from one time to another, by a clock that starts there, in [s].
+
+        Raises InputError where it depends on time and its class does not say how.
+        """
+        if self.timed:
+            raise InputError(
+                f"a {type(self).__name__} depends on time and says of no part of a motion what it "
+                "is there: give its class a method `within(begin, end)`."
+            )
+        return self
 
     @abstractmethod
     def value(self, *jet: Array, t: Array | None = None) -> Array:

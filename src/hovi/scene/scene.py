@@ -15,6 +15,7 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from hovi.checks.arguments import check_arguments_except
+from hovi.checks.kinds import is_number
 from hovi.checks.shapes import numbers_of
 from hovi.dynamics.mimic_kernel import rnea_kernel, without_rnea_kernel
 from hovi.dynamics.moving_base_torque import MovingBaseTorque, inverse_dynamics, on_base_joints
@@ -46,6 +47,7 @@ class Scene:
     effects: at most one of each kind; or a table of their keys as in a scene file, such as
         {"gravity": {"acceleration": 9.81}}.
     passive: names of unactuated joints, with all their coordinates.
+    begin: what the time t of the effects' formulas is at the start of a motion, in [s].
     compile: compile CasADi functions once, to libraries in the user's cache folder. It needs a C
         compiler, takes seconds and does not change results.
     model: the scene's own copy of the robot's model, with gravity and armature set by effects and
@@ -57,11 +59,14 @@ class Scene:
     robot: Robot
     effects: Sequence[Effect] = ()
     passive: Sequence[str] = field(default=(), kw_only=True)
+    begin: float = field(default=0.0, kw_only=True)
     compile: bool = field(default=False, kw_only=True)
     model: pin.Model = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         effects = as_effects(self.effects)
+        if not np.isfinite(self.begin):
+            raise SceneError(f"`begin` of a scene must be a finite time in [s], got {self.begin}.")
         keys = [effect.key for effect in effects]
         for key in set(keys):
             if keys.count(key) > 1:
@@ -82,17 +87,17 @@ class Scene:
 
         Derivatives of RNEA are analytic if the kernel supports all joints, CasADi's otherwise.
         """
-        symbols, added = self.terms.symbols, self.terms.torque
+        symbols, added, base = self.terms.symbols, self.terms.torque, self.terms.base
         space = self.robot.curved_space
         if not self.analytic:
-            tau = inverse_dynamics(self.model, symbols.base, *symbols.columns())
+            tau = inverse_dynamics(self.model, base, *symbols.columns())
             total = tau if added is None else tau + added
             return CasadiTorque(symbols.columns(), total, self.compile, space)
         main: TorqueModel
-        if symbols.base is None:
+        if base is None:
             main = AnalyticTorque(rnea_kernel(self.model))
         else:
-            main = MovingBaseTorque(self.model, symbols.base, symbols.t, self.compile)
+            main = MovingBaseTorque(self.model, base, symbols.t, self.compile)
         if added is None:
             return main
         return SummedTorque(main, CasadiTorque(symbols.columns(), added, self.compile, space))
@@ -100,7 +105,7 @@ class Scene:
     @cached_property
     def terms(self) -> SceneTerms:
         """The terms that effects add to RNEA and to the cost, as expressions."""
-        return SceneTerms(self.robot, self.effects, self.model)
+        return SceneTerms(self.robot, self.effects, self.model, self.begin)
 
     @cached_property
     def passive_coordinates(self) -> npt.NDArray[np.intp]:
@@ -136,13 +141,16 @@ class Scene:
         require_known_joints(self.robot)
         active = ~self._is_passive
         R = np.where(active, self._effort_weight(weight), 0.0)
-        found = EffortLagrangian(self.torques, self, R, self._potential, self._running_cost)
-        W = self.terms.jerk_weight
+        found, W = self.effort(R), self.terms.jerk_weight
         if W is not None:
             return JerkLagrangian(found, W)
         if regular and (self._running_cost is not None or not R[active].all()):
             require_regular(found, self.robot, active)
         return found
+
+    def effort(self, weight: Array) -> EffortLagrangian:
+        """L~ of `effort_lagrangian`, unchecked and without a cost on the jerk; weight: R."""
+        return EffortLagrangian(self.torques, self, weight, self._potential, self._running_cost)
 
     @property
     def _has_effort_matrix(self) -> bool:
@@ -180,10 +188,19 @@ class Scene:
         kept = [effect for effect in self.effects if effect.key != key]
         return dataclasses.replace(self, effects=kept)
 
+    def from_time(self, time: float) -> Scene:
+        """The scene by a clock that starts at a time, in [s]: itself if no effect depends on it.
+
+        Its functions are not compiled, since each would be of that time alone.
+        """
+        if time == 0.0 or not self.terms.timed:
+            return self
+        return dataclasses.replace(self, begin=self.begin + time, compile=False)
+
     def graph(self) -> ca.Function:
         """(q, v, a, t) -> (tau, L~), as one expression graph, without a cost on the jerk."""
         symbols, added = self.terms.symbols, self.terms.torque
-        tau = inverse_dynamics(self.model, symbols.base, *symbols.columns())
+        tau = inverse_dynamics(self.model, self.terms.base, *symbols.columns())
         tau = tau if added is None else tau + added
         weight = np.where(self._is_passive, 0.0, self.terms.effort_weight)
         cost = ca.dot(ca.DM(weight), tau**2) / 2
@@ -205,6 +222,8 @@ class Scene:
         """A text: what is simulated, which properties of the URDF are not, and the costs."""
         lines = [f"scene of robot {self.robot.name!r}", "simulated:"]
         lines += ["  rigid-body inertia (RNEA)", *(f"  {e.describe()}" for e in self.effects)]
+        if self.begin:
+            lines.append(f"  motions begin at t = {self.begin:g} s of the effects' time")
         if self.passive:
             lines.append(f"  no torque at {', '.join(self.passive)}")
         lines.append("left out:")
@@ -230,7 +249,8 @@ class Scene:
                 )
         effects = {effect.key: dataclasses.asdict(effect) for effect in self.effects}
         passive = {"passive": list(self.passive)} if self.passive else {}
-        return {"robot": self.robot.to_dict(), "effects": effects, **passive}
+        begin = {"begin": float(self.begin)} if self.begin else {}
+        return {"robot": self.robot.to_dict(), "effects": effects, **passive, **begin}
 
     @classmethod
     def from_dict(
@@ -249,11 +269,14 @@ class Scene:
             raise SceneError("a stored scene needs the tables 'robot' and 'effects'.")
         effects = [effect_of_table(key, values) for key, values in data["effects"].items()]
         robot = Robot.from_dict(data["robot"], package_dirs, meshes)
-        return cls(robot, effects, passive=_passive_names(data.get("passive", ())))
+        passive, begin = _passive_names(data.get("passive", ())), data.get("begin", 0.0)
+        if not is_number(begin):
+            raise SceneError(f"the `begin` of a stored scene is a time in [s], not {begin!r:.80}.")
+        return cls(robot, effects, passive=passive, begin=float(begin))
 
     @cached_property
     def _without_kernel(self) -> tuple[str, ...]:
-        moves = self.terms.symbols.base is not None
+        moves = self.terms.base is not None
         return without_rnea_kernel(on_base_joints(self.model) if moves else self.model)
 
     @cached_property
@@ -299,7 +322,7 @@ class Scene:
 
     def __getstate__(self) -> dict[str, Any]:
         """The fields without cached functions, which worker processes build themselves."""
-        names = ("robot", "effects", "passive", "compile", "model")
+        names = ("robot", "effects", "passive", "begin", "compile", "model")
         state = {name: getattr(self, name) for name in names}
         return {**state, "model": PortableModel.of(self.model)}
 

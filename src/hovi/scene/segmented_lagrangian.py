@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cached_property
 
 import numpy as np
@@ -77,6 +77,12 @@ class SegmentedLagrangian(Lagrangian):
     def coordinates(self) -> Coordinates:
         """Those of the first segment; the others have the same."""
         return self.lagrangians[0].coordinates
+
+    def within(self, begin: float, end: float) -> Lagrangian:
+        """That of the segments between two times, by a clock that starts at the first, in [s]."""
+        chosen, ends = segments_within(self.ends, begin, end)
+        parts = tuple(each.within(begin, end) for each in self.lagrangians[chosen])
+        return SegmentedLagrangian(parts, ends) if ends else parts[0]
 
     @property
     def timed(self) -> bool:
@@ -168,6 +174,19 @@ class SegmentedLagrangian(Lagrangian):
             parts.append(function(self.lagrangians[s], tuple(x[here] for x in jet), t[here]))
         order = np.argsort(np.concatenate([np.flatnonzero(number == s) for s in present]))
         return tuple(np.concatenate(arrays)[order] for arrays in zip(*parts, strict=True))
+
+
+def segments_within(
+    ends: Sequence[float], begin: float, end: float
+) -> tuple[slice, tuple[float, ...]]:
+    """The numbers of the segments from one time to another, and where they meet, from there.
+
+    ends: times at which the segments but the last end, ascending, in [s].
+    """
+    least = NODE_TOLERANCE * end
+    first = int(np.searchsorted(np.array(ends), begin + least))
+    last = int(np.searchsorted(np.array(ends), end - least))
+    return slice(first, last + 1), tuple(each - begin for each in ends[first:last])
 
 
 def _require_fitting(first: Lagrangian, other: Lagrangian) -> None:

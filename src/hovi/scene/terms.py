@@ -25,16 +25,29 @@ class SceneTerms:
     """The sums of the terms that effects add to RNEA and to the cost.
 
     robot: of the scene. effects: its effects. model: its own, with gravity, armature and payload.
+    begin: what the effects' time is at t = 0, in [s].
     Properties raise SceneError for an effect that modifies more than its `touches`.
     """
 
     robot: Robot
     effects: Sequence[Effect]
     model: pin.Model
+    begin: float = 0.0
+
+    def at_times(self, term: ca.SX) -> ca.SX:
+        """What effects return, by their own time, as an expression of the time t of a motion."""
+        t = self.symbols.t
+        return ca.substitute(term, t, t + self.begin) if self.begin else term
+
+    @cached_property
+    def base(self) -> ca.SX | None:
+        """The pose of a moving base at t, as in `SceneSymbols`; None if it is fixed."""
+        moved = self.symbols.base
+        return None if moved is None else self.at_times(moved)
 
     @cached_property
     def symbols(self) -> SceneSymbols:
-        """The symbols of the expressions, with the motion of the base."""
+        """The symbols of the expressions, with the motion of the base by the effects' time."""
         symbols = SceneSymbols.of(self.robot, self.model)
         motions = [effect.base(self.robot, symbols) for effect in self.effects]
         named = [motion for motion in motions if motion is not None]
@@ -86,7 +99,7 @@ class SceneTerms:
 
     def _sum(self, touch: Touch, term: str, *symbols: Any) -> ca.SX | None:
         named = list(self._touching(touch, term, *symbols))
-        return sum(named[1:], named[0]) if named else None
+        return self.at_times(sum(named[1:], named[0])) if named else None
 
     def _touching(self, touch: Touch, term: str, *symbols: Any) -> Iterator[ca.SX]:
         """The terms of one kind that effects add."""

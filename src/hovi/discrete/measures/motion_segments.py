@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from typing import NamedTuple
 
 import numpy as np
@@ -22,6 +23,15 @@ class MotionSegment(NamedTuple):
     begin: float
     end: float
     intervals: slice
+
+
+def with_segment_names(motion: Trajectory, of: Trajectory) -> Trajectory:
+    """A motion with the names of another's last segments, which are its own."""
+    names = of.metadata.get(SEGMENT_NAMES)
+    if motion.segments is None or not isinstance(names, list):
+        return motion
+    own = names[-len(motion.segments.intervals) :]
+    return dataclasses.replace(motion, metadata={**motion.metadata, SEGMENT_NAMES: own})
 
 
 def motion_segments(trajectory: Trajectory) -> list[MotionSegment]:

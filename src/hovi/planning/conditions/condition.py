@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Sequence
 from functools import lru_cache
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, Self, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -104,6 +104,13 @@ class Condition(Generic[Values, Place]):
     def timed(self) -> bool:
         """Whether it changes with time, whatever the motion; of a condition `with_function`."""
         return "t" in self.y.needs or (isinstance(self.on, TwoSided) and self.on.varies)
+
+    def from_time(self, time: float) -> Self:
+        """The same by a clock that starts at a time, in [s], but for the times of its place."""
+        if not self.timed:
+            return self
+        on: Any = self.on.from_time(time)
+        return dataclasses.replace(self, function=self.y.from_time(time), on=on)
 
 
 def _require_place(given: Condition[Any, Any]) -> None:

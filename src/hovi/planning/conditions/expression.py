@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import inspect
 from collections.abc import Callable, Mapping
 from functools import cached_property
@@ -43,11 +44,26 @@ class Expression(Function):
         self._n, self._size = int(symbols["v"].numel()), int(y.numel())
         self._named = [x for x in ARGUMENTS if ca.depends_on(y, symbols[x])]
         self._names = [x for x in self._named if x != "t"]
+        self._begin = 0.0
+
+    def from_time(self, time: float) -> Function:
+        """The same by a clock that starts at a time, in [s]: with the same compiled functions."""
+        if "t" not in self._named:
+            return self
+        later = copy.copy(self)
+        later._begin = self._begin + time
+        vars(later).pop("_enclosure", None)
+        return later
 
     @property
     def function(self) -> ca.Function:
         """y of the arguments that it names, in the order of ARGUMENTS."""
-        return self._values.function
+        own = self._values.function
+        if not self._begin:
+            return own
+        given = [ca.SX.sym(x, own.numel_in(i)) for i, x in enumerate(self._named)]
+        by_its_clock = [*given[:-1], given[-1] + self._begin]  # t is the last of ARGUMENTS
+        return ca.Function("y", given, [own(*by_its_clock)])
 
     @property
     def needs(self) -> frozenset[str]:
@@ -86,7 +102,7 @@ class Expression(Function):
     def __getstate__(self) -> dict[str, Any]:
         """The functions without the expression, which cannot be pickled."""
         functions = {name: getattr(self, name) for name in ("_values", "_slopes", "_curvature")}
-        kept = ("_named", "_names", "_n", "_size", "_pairs")
+        kept = ("_named", "_names", "_n", "_size", "_pairs", "_begin")
         return functions | {name: getattr(self, name) for name in kept}
 
     @cached_property
@@ -94,7 +110,8 @@ class Expression(Function):
         return Enclosure(self.function)
 
     def _arguments(self, at: Points) -> list[Array]:
-        return [at.argument(x) for x in self._named]
+        shifts = {"t": self._begin} if self._begin else {}
+        return [at.argument(x) + shifts[x] if x in shifts else at.argument(x) for x in self._named]
 
     def _block(self, name: str) -> slice:
         """The columns of an argument among those of (q, v, a, tau)."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
@@ -82,6 +83,10 @@ class Function(ABC):
         """
         return {}
 
+    def from_time(self, time: float) -> Function:
+        """The same by a clock that starts at a time, in [s]."""
+        return LaterFunction(self, time) if "t" in self.needs else self
+
     def named(self, entry: int) -> tuple[str, str] | None:
         """What an entry of y is called in sentences, and its unit; None if the condition says."""
         return None
@@ -94,6 +99,54 @@ class Function(ABC):
         """By how much y misses its value at one instant, as a clause; missed: shape (size,)."""
         entry = int(np.argmax(np.abs(missed)))
         return f"its entry {entry} misses it by {abs(missed[entry]):.3g}"
+
+
+class LaterFunction(Function):
+    """A function by a clock that starts at a time, in [s]. of: the function."""
+
+    def __init__(self, of: Function, time: float) -> None:
+        self.of, self.time = of, time
+
+    def _by_its_clock(self, at: Points) -> Points:
+        return replace(at, t=at.t + self.time)
+
+    @property
+    def needs(self) -> frozenset[str]:
+        """See Function."""
+        return self.of.needs
+
+    @property
+    def size(self) -> int:
+        """See Function."""
+        return self.of.size
+
+    def values(self, at: Points) -> Array:
+        """See Function."""
+        return self.of.values(self._by_its_clock(at))
+
+    def slopes(self, at: Points) -> Slopes:
+        """See Function."""
+        return self.of.slopes(self._by_its_clock(at))
+
+    def curvature(self, at: Points, weights: Array) -> Curvature:
+        """See Function."""
+        return self.of.curvature(self._by_its_clock(at), weights)
+
+    def from_time(self, time: float) -> Function:
+        """See Function."""
+        return LaterFunction(self.of, self.time + time)
+
+    def named(self, entry: int) -> tuple[str, str] | None:
+        """See Function."""
+        return self.of.named(entry)
+
+    def is_spurious(self, at: Points) -> bool:
+        """See Function."""
+        return self.of.is_spurious(self._by_its_clock(at))
+
+    def describe(self, at: Points, missed: Array) -> str:
+        """See Function."""
+        return self.of.describe(self._by_its_clock(at), missed)
 
 
 STATE = "q", "v"

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import dataclasses
 from abc import ABC, abstractmethod
 from collections.abc import Callable
+from typing import Self
 
 import numpy as np
 import numpy.typing as npt
@@ -35,6 +37,10 @@ class Equal:
             raise InputError(f"an Equal needs finite numbers, got {self.value!r}.")
         object.__setattr__(self, "value", value)
 
+    def from_time(self, time: float) -> Self:
+        """See TwoSided: itself."""
+        return self
+
     def missed(self, y: Array) -> Array:
         """y - value, shape of y."""
         return np.asarray(y - np.asarray(self.value))
@@ -47,6 +53,10 @@ class TwoSided(ABC):
     def varies(self) -> bool:
         """Whether a bound is a function of time."""
         return False
+
+    def from_time(self, time: float) -> Self:
+        """The same by a clock that starts at a time, in [s]."""
+        return self
 
     @abstractmethod
     def at(self, t: Array, size: int | None, within: Array | None = None) -> tuple[Array, Array]:
@@ -92,6 +102,11 @@ class Between(TwoSided):
         """Whether a bound is a function of time."""
         return callable(self.lower) or callable(self.upper)
 
+    def from_time(self, time: float) -> Self:
+        """See TwoSided."""
+        lower, upper = (_from_time(each, time) for each in (self.lower, self.upper))
+        return dataclasses.replace(self, lower=lower, upper=upper)
+
     def at(self, t: Array, size: int | None, within: Array | None = None) -> tuple[Array, Array]:
         """See TwoSided.
 
@@ -118,6 +133,23 @@ class Between(TwoSided):
         if len({row.size for row in rows}) > 1:
             raise InputError(f"the {name} bound of a Between has not as many numbers at all times.")
         return np.stack(rows) if rows else np.zeros((0, 1))
+
+
+@dataclass(frozen=True, eq=False)
+class _Later:
+    """A bound that is a function of time, by a clock that starts at `time`."""
+
+    bound: Callable[[float], npt.ArrayLike]
+    time: float
+
+    def __call__(self, t: float) -> npt.ArrayLike:
+        return self.bound(self.time + t)
+
+
+def _from_time(bound: Bound, time: float) -> Bound:
+    if isinstance(bound, _Later):
+        return _Later(bound.bound, bound.time + time)
+    return _Later(bound, time) if callable(bound) else bound
 
 
 def _value(name: str, bound: Callable[[float], npt.ArrayLike], t: float) -> Array:

@@ -64,7 +64,7 @@ def falls_freely(scene: Scene) -> bool:
     if kind_of(model.joints[1]) is not FLOATING or not alone:
         return False
     untouched = terms.torque is None or ca.SX(terms.torque)[:6].is_zero()
-    return untouched and terms.symbols.base is None and not scene.model.armature[:6].any()
+    return untouched and terms.base is None and not scene.model.armature[:6].any()
 
 
 def centroidal_state(scene: Scene, q: Array, v: Array) -> CentroidalState:

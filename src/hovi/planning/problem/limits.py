@@ -27,6 +27,7 @@ from hovi.planning.problem.way_back.excused import Excused, widening
 from hovi.robot.robot import Robot
 from hovi.robot.space.angle_ranges import ranges_in_degrees, speeds_in_degrees
 from hovi.robot.space.coordinates import Coordinates
+from hovi.scene.segmented_lagrangian import segments_within
 from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
@@ -164,6 +165,14 @@ class Limits(LimitsSummary):
     def at_ends(self) -> tuple[Limits, Limits]:
         """The limits at the start and at the goal."""
         return (self.parts[0], self.parts[-1]) if self.parts else (self, self)
+
+    def within(self, begin: float, end: float) -> Limits:
+        """Those of the segments between two times, by a clock that starts at the first, in [s]."""
+        if not self.parts:
+            return self
+        chosen, ends = segments_within(self.ends, begin, end)
+        parts = self.parts[chosen]
+        return Limits.of_segments(parts, ends) if ends else parts[0]
 
     def until(self, time: float) -> Limits:
         """The limits just before a time, in [s]: those of its segment, or these."""

@@ -16,6 +16,7 @@ from hovi.checks.arguments import check_arguments
 from hovi.discrete.grid import DiscretePath
 from hovi.discrete.instants import Instants
 from hovi.discrete.measures.motion_effort import effort_of
+from hovi.discrete.measures.motion_segments import with_segment_names
 from hovi.discrete.state import Periodic
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError
@@ -171,7 +172,7 @@ class Solution(SolutionSummary):
         again = _Again(problem, path, known[0], self.check, known[1])
         if self.status is Status.STATIONARY:
             options = {"method": Stationary()} | options
-        return again.within(deadline, "this is the last motion", **options)
+        return self._named(again.within(deadline, "this is the last motion", **options))
 
     @check_arguments
     def advance(
@@ -202,9 +203,12 @@ class Solution(SolutionSummary):
         time_limit: as for `replan`; what comes back is this motion from that time on.
         strict: as for `replan`.
         options: as for `solve`.
-        Via points that have passed are left out.
+        Via points and segments that have passed are left out, and the segment that has begun is
+        shortened; with another duration, the times of the others are stretched with the motion.
+        Effects, moving obstacles and conditions that depend on time see the time since the start
+        of the first motion, however often it is advanced.
         Raises InputError if this solution has no problem, if it ends before the time, or if it is
-        periodic, in segments, among moving obstacles, or of a scene that depends on time.
+        periodic.
         """
         from hovi.planning.solver.receding.shift import Shift
 
@@ -227,7 +231,13 @@ class Solution(SolutionSummary):
         if self.status is Status.STATIONARY:
             options = {"method": Stationary()} | options
         last = f"this is the last motion from {shift.elapsed:g} s on"
-        return _Again(problem, path, central, check).within(deadline, last, **options)
+        return self._named(_Again(problem, path, central, check).within(deadline, last, **options))
+
+    def _named(self, again: Solution) -> Solution:
+        """A solution of what is left of this one's problem, whose segments keep their names."""
+        motion = with_segment_names(again.trajectory, self.trajectory)
+        same = motion is again.trajectory
+        return again if same else dataclasses.replace(again, trajectory=motion)
 
 
 Check = Callable[[Solution], Solution]

@@ -183,7 +183,7 @@ def _grasped(table: ShapedTable, robot: Robot, toml: TomlText) -> tuple[tuple[Gr
 def _scene(table: ShapedTable, robot: Robot, toml: TomlText) -> Scene:
     effects = read_effects(table.effects, robot, toml)
     try:
-        return Scene(robot, effects=effects, passive=table.passive)
+        return Scene(robot, effects=effects, passive=table.passive, begin=table.begin)
     except SceneError as wrong:
         raise toml.error(("passive",), str(wrong)) from None
 

@@ -285,6 +285,7 @@ class ShapedTable(Table):
     )
     mimic: bool = Field(default=False, description="true or false")
     passive: list[str] = Field(default=[], description="a list of joint names")
+    begin: float = Field(default=0.0, allow_inf_nan=False, description="a time in seconds")
     duration: Duration | None = Field(default=None, description=DURATION_IN_WORDS)
     group: str | None = Field(
         default=None, description="the name of a group of joints in the robot's SRDF"

@@ -89,6 +89,7 @@ def _robot_keys(task: Task, folder: Path) -> dict[str, Any]:
         "free_flyer": _free_flyer(source),
         "mimic": source.mimic or None,
         "passive": list(task.scene.passive),
+        "begin": float(task.scene.begin) or None,
     }
 
 

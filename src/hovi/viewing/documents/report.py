@@ -214,10 +214,8 @@ def _description(scene: Scene) -> str:
 def _contribution(trajectory: Trajectory, scene: Scene, key: str) -> Row:
     """Root mean square, largest value, and where it is, of the torques of one effect."""
     t = np.linspace(0.0, trajectory.duration, _SAMPLES)
-    others = [each for each in scene.effects if each.key != key]
     try:
-        without = Scene(scene.robot, others, passive=scene.passive)
-        bare = dataclasses.replace(trajectory, scene=without)
+        bare = dataclasses.replace(trajectory, scene=scene.without(key))
         difference: Array = trajectory.sample(t).tau - bare.sample(t).tau
     except HoviError as error:
         return "", "", str(error)

@@ -114,7 +114,7 @@ def _torques(
 def _depends_on_acceleration(scene: Scene) -> bool:
     """Whether effects add torques that depend on the acceleration."""
     added, a = scene.terms.torque, scene.terms.symbols.columns()[2]
-    moving = scene.terms.symbols.base is not None
+    moving = scene.terms.base is not None
     return moving or (added is not None and bool(ca.depends_on(ca.SX(added), a)))
 
 

@@ -41,7 +41,7 @@ def _bisected(scene: Scene, nodes: bytes) -> Bisection:
 @lru_cache(maxsize=64)
 def base_parts(scene: Scene) -> tuple[TimePart, ...]:
     """The functions of time in the position, velocity and acceleration of a moving base."""
-    base, t = scene.terms.symbols.base, scene.terms.symbols.t
+    base, t = scene.terms.base, scene.terms.symbols.t
     return () if base is None else tuple(time_parts("effect 'moving_base'", base_jet(base, t), t))
 
 
@@ -61,6 +61,6 @@ def functions_of_time(scene: Scene) -> tuple[TimePart, ...]:
             effect.running_cost(robot, resting, tau),
             *(() if base is None else base_jet(base, t)),
         ]
-        given = [each for each in terms if each is not None]
+        given = [scene.terms.at_times(each) for each in terms if each is not None]
         found += time_parts(f"effect {effect.key!r}", given, t)
     return tuple(found)

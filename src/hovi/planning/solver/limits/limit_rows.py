@@ -129,7 +129,10 @@ class LimitRows:
         grid: begins with that interval, whose length may be another one.
         """
         rows, left = self.copied(), self.parts.at(self.parts.k >= first)
-        rows.limits = dataclasses.replace(self.limits, excused=())  # in time of the whole motion
+        T = self.grid.duration
+        later = self.limits.within(T - grid.duration, T)
+        rows.limits = dataclasses.replace(later, excused=())  # in time of the whole motion
+        rows.of = LimitedCoordinates.of(rows.limits, grid, self.space)
         rows.grid, rows.parts = grid, dataclasses.replace(left, k=left.k - first)
         rows._set(rows._rows_of(rows.parts))
         now, before = rows._places_from(first), self._places

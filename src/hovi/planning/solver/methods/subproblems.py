@@ -18,7 +18,6 @@ from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import DiscretePath, Grid
 from hovi.discrete.state import Periodic, State
 from hovi.planning.conditions.asked import times_of
-from hovi.planning.problem.limits import Limits
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.problem.seams import Hold
 from hovi.scene.lagrangian import Lagrangian
@@ -87,7 +86,7 @@ def _between(
     whole = problem.grid
     grid = Grid(whole.steps[first:last], whole.schemes[first:last])
     begin, end = float(whole.t[first]), float(whole.t[last])
-    ld = DiscreteLagrangian(_lagrangian(problem.ld.lagrangian, begin, end), grid)
+    ld = DiscreteLagrangian(problem.ld.lagrangian.within(begin, end), grid)
     start = problem.start
     if first in held:
         start = dataclasses.replace(held[first].start, v=held[first].v)
@@ -97,34 +96,10 @@ def _between(
         for each in problem.via
         if first < whole.node_at(each.time) < last
     )
-    limits = None if problem.limits is None else _limits(problem.limits, begin, end)
+    limits = None if problem.limits is None else problem.limits.within(begin, end)
     asked = problem.conditions
     return TrajectoryProblem(ld, start, goal, limits, via, problem.clearance, conditions=asked)
 
 
 def _segments_of(of: Lagrangian) -> Sequence[Lagrangian]:
     return of.lagrangians if isinstance(of, SegmentedLagrangian) else (of,)
-
-
-def _inside(ends: Sequence[float], begin: float, end: float) -> tuple[slice, tuple[float, ...]]:
-    """The numbers of the segments from one time to another, and where they meet, from there."""
-    least = 1e-9 * end
-    first = int(np.searchsorted(np.array(ends), begin + least))
-    last = int(np.searchsorted(np.array(ends), end - least))
-    return slice(first, last + 1), tuple(each - begin for each in ends[first:last])
-
-
-def _lagrangian(of: Lagrangian, begin: float, end: float) -> Lagrangian:
-    if not isinstance(of, SegmentedLagrangian):
-        return of
-    chosen, ends = _inside(of.ends, begin, end)
-    parts = of.lagrangians[chosen]
-    return SegmentedLagrangian(parts, ends) if ends else parts[0]
-
-
-def _limits(limits: Limits, begin: float, end: float) -> Limits:
-    if not limits.parts:
-        return limits
-    chosen, ends = _inside(limits.ends, begin, end)
-    parts = limits.parts[chosen]
-    return Limits.of_segments(parts, ends) if ends else parts[0]

@@ -92,15 +92,13 @@ class Remainder:
             return rows.copied(), np.arange(rows.size)
         return rows.remaining(self.grid, self.first)
 
-    def points(self, problem: TrajectoryProblem) -> Index:
+    def points(self, ld: DiscreteLagrangian, rest: DiscreteLagrangian) -> Index:
         """The quadrature points whose multipliers those of the remainder begin with.
 
-        problem: on the whole grid. Points are numbered as in its discrete Lagrangian; those of the
+        ld, rest: on the whole grid and on the remainder. Points are numbered as in ld; those of the
         first interval are the nearest ones in time.
         """
-        ld, grid = problem.ld, self.grid
         numbers, old = (np.concatenate(each) for each in (ld.point_intervals, ld.point_times))
-        rest = DiscreteLagrangian(ld.lagrangian, grid)
         own, t = (np.concatenate(each) for each in (rest.point_intervals, rest.point_times))
         before, after = np.lexsort((old, numbers)), np.lexsort((t, own))
         found = np.zeros(len(own), dtype=np.intp)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Sequence
 from functools import cached_property
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -24,11 +24,15 @@ from hovi.planning.conditions.condition import Condition
 from hovi.planning.conditions.places import AtTimes
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.goals import Via
+from hovi.planning.problem.limits import Limits
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.central_path import CentralPath
 from hovi.planning.solver.receding.ends import first_state, turned
 from hovi.planning.solver.receding.remainder import Array, Index, Remainder
+from hovi.scene.segmented_lagrangian import SegmentedLagrangian
 from hovi.system.dataclass import dataclass
+
+Segmented = TypeVar("Segmented", SegmentedLagrangian, Limits)
 
 SPACING = 8.0
 """Least ratio of barrier parameters of the points that are kept of a central path."""
@@ -49,7 +53,7 @@ class Shift:
     def of(cls, problem: TrajectoryProblem, elapsed: float, duration: float | None) -> Shift:
         """The shift by a time; duration: what is left if None.
 
-        Raises InputError for a time after the end, and for problems that cannot be shifted.
+        Raises InputError for a time after the end, and for periodic motions.
         """
         T = problem.grid.duration
         if not 0.0 <= elapsed < T:
@@ -59,7 +63,8 @@ class Shift:
             )
         if duration is not None and not (np.isfinite(duration) and duration > 0):
             raise InputError(f"the duration must be positive and finite, got {duration} s.")
-        _require_shiftable(problem)
+        if problem.periodic:
+            raise InputError("a periodic motion has no rest: replan it with its whole period.")
         left = T - elapsed
         if duration is None or abs(duration - left) <= 1e-12 * T:
             duration = left
@@ -68,35 +73,61 @@ class Shift:
         return shift
 
     def between(self, start: State, goal: State | FrameGoal) -> TrajectoryProblem:
-        """The problem of what is left, between other states; via points that have passed are not.
+        """The problem of what is left, between other states, by a clock that starts anew.
 
-        Times of via points are stretched like the motion.
+        Via points and segments that have passed are left out. Times of the others are stretched
+        like the motion; effects, obstacles and conditions go on as they would have.
         """
         via = tuple(
             dataclasses.replace(each, time=(each.time - self.elapsed) * self._ratio)
             for each in self._via
         )
-        ld = DiscreteLagrangian(self.problem.ld.lagrangian, self.grid)
-        later = tuple(filter(None, map(self._later, self.problem.conditions)))
+        limits, clearance = self._limits, self.problem.clearance
         return dataclasses.replace(
-            self.problem, ld=ld, start=start, goal=goal, via=via, conditions=later
+            self.problem,
+            ld=self._ld,
+            start=start,
+            goal=goal,
+            via=via,
+            limits=None if limits is None else self._stretched(limits),
+            clearance=None if clearance is None else clearance.from_time(self.elapsed),
+            conditions=tuple(filter(None, map(self._later, self.problem.conditions))),
         )
+
+    @cached_property
+    def _ld(self) -> DiscreteLagrangian:
+        """That of what is left."""
+        of = self.problem.ld.lagrangian.within(self.elapsed, self.problem.grid.duration)
+        if isinstance(of, SegmentedLagrangian):
+            of = self._stretched(of)
+        return DiscreteLagrangian(of, self.grid)
+
+    @cached_property
+    def _limits(self) -> Limits | None:
+        """The limits of what is left, before it is stretched."""
+        limits = self.problem.limits
+        return limits and limits.within(self.elapsed, self.problem.grid.duration)
+
+    def _stretched(self, of: Segmented) -> Segmented:
+        """The same of segments that are stretched like the motion."""
+        if self._ratio == 1.0 or not of.ends:
+            return of
+        return dataclasses.replace(of, ends=tuple(each * self._ratio for each in of.ends))
 
     def _later(self, given: Condition[Any, Any]) -> Condition[Any, Any] | None:
         """A condition with its times by the new clock; None where all of them have passed."""
+        later = given.from_time(self.elapsed)
         if not isinstance(given.where, AtTimes):
-            return given
+            return later
         left = [(time - self.elapsed) * self._ratio for time in self._left(times_of([given]))]
-        return dataclasses.replace(given, where=AtTimes(left)) if left else None
+        return dataclasses.replace(later, where=AtTimes(left)) if left else None
 
     @cached_property
     def grid(self) -> Grid:
         """The grid of what is left."""
         if self._ratio == 1.0:
             return self._remainder.grid
-        T = self.problem.grid.duration
-        stops = {each.time for each in self._via} | set(self._left(times_of(self._asked)))
-        times = [(time - self.elapsed) * self._ratio for time in sorted(stops - {T})]
+        times = [(time - self.elapsed) * self._ratio for time in sorted(self._stops.values())]
         return self.problem.grid.stretched(self.duration).with_nodes(times)
 
     def path(self, path: DiscretePath) -> DiscretePath:
@@ -121,7 +152,8 @@ class Shift:
     def central(self, central: CentralPath) -> CentralPath | None:
         """The central path of the rest: paths, rows and multipliers follow.
 
-        None for another duration.
+        None for another duration, and without rows where limits that have passed were the widest,
+        whose ranges are the scales of all.
         """
         if self._ratio != 1.0:
             return None
@@ -130,7 +162,7 @@ class Shift:
             if not chosen or level * SPACING <= chosen[-1][0]:
                 chosen.append((level, path))
         points = tuple((level, self.path(x)) for level, x in [*chosen, central.points[-1]])
-        if central.rows is None:
+        if central.rows is None or not self._scaled_alike:
             return CentralPath(points, None)
         rows, kept = self._remainder.rows(central.rows)
         shifted = CentralPath(points, rows)
@@ -144,7 +176,7 @@ class Shift:
 
         at_points: their number at the quadrature points. rows: those that theirs were, -1 for none.
         """
-        points = self._remainder.points(self.problem)
+        points = self._remainder.points(self.problem.ld, self._ld)
         width = at_points // sum(len(each) for each in self.problem.ld.point_times)
         first = (points[:, None] * width + np.arange(width)).ravel()
         return np.concatenate([first, np.where(rows < 0, -1, at_points + rows)])
@@ -152,18 +184,30 @@ class Shift:
     @cached_property
     def _remainder(self) -> Remainder:
         grid = self.problem.grid
-        stops = *(via.time for via in self.problem.via), *times_of(self._asked)
-        nodes = tuple(grid.node_at(time) for time in stops)
-        return Remainder.after(grid, self.elapsed, nodes)
+        return Remainder.after(grid, self.elapsed, tuple(self._stops))
+
+    @property
+    def _scaled_alike(self) -> bool:
+        """Whether what is left of the limits has the ranges and coordinates of all of them."""
+        limits, left = self.problem.limits, self._limits
+        if limits is None or left is None:
+            return True
+        pairs = (limits.ranges, left.ranges), (limits.bounded, left.bounded)
+        return all(np.array_equal(*pair) for pair in pairs)
+
+    @property
+    def _stops(self) -> dict[int, float]:
+        """The times that have nodes and have not passed, in [s], by the number of the node."""
+        of = self.problem.ld.lagrangian
+        seams = of.ends if isinstance(of, SegmentedLagrangian) else ()
+        asked, via = times_of(self.problem.conditions), [each.time for each in self.problem.via]
+        grid, left = self.problem.grid, self._left([*seams, *asked, *via])
+        return {grid.node_at(time): time for time in left if time < grid.duration * (1.0 - 1e-9)}
 
     @property
     def _via(self) -> list[Via]:
         """The via points that have not passed."""
         return [each for each in self.problem.via if self._left([each.time])]
-
-    @property
-    def _asked(self) -> Sequence[Condition[Any, Any]]:
-        return self.problem.conditions
 
     def _left(self, times: Sequence[float]) -> list[float]:
         """Those of some times that have not passed."""
@@ -175,25 +219,3 @@ class Shift:
         """The new duration relative to the time that is left."""
         left = self.problem.grid.duration - self.elapsed
         return 1.0 if self.duration == left else self.duration / left
-
-
-def _require_shiftable(problem: TrajectoryProblem) -> None:
-    """Raise InputError for problems whose time cannot begin anew in their middle."""
-    if problem.periodic:
-        raise InputError("a periodic motion has no rest: replan it with its whole period.")
-    if problem.ld.segments is not None:
-        raise InputError("a motion in segments cannot be shifted: replan it as a whole.")
-    clearance = problem.clearance
-    if clearance is not None and any(each.motion is not None for each in clearance.obstacles):
-        raise InputError(
-            "obstacles move in a time that begins anew with every motion: replan it as a whole."
-        )
-    if asked := [each.name for each in problem.conditions if each.timed]:
-        raise InputError(
-            f"condition {asked[0]!r} depends on time, which begins anew with every motion: replan "
-            "it as a whole."
-        )
-    if problem.ld.lagrangian.timed:
-        raise InputError(
-            "the scene depends on time, which begins anew with every motion: replan it as a whole."
-        )
