@@ -627,12 +627,6 @@ def test_a_condition_without_a_value_is_said(scene: hovi.Scene) -> None:
     assert "condition 'root' has no finite value at t = " in found.message
 
 
-def test_what_depends_on_time_needs_a_fixed_duration(scene: hovi.Scene) -> None:
-    asked = hovi.Condition('q["elbow_joint"] - t', hovi.Between(-9, 9), name="clock")
-    with pytest.raises(InputError, match="'clock' depends on time, which a free duration"):
-        hovi.plan(scene, START, GOAL, (1.0, 2.0), conditions=[asked], **OPTIONS)
-
-
 def test_torques_need_a_robot() -> None:
     ld = hovi.DiscreteLagrangian(
         hovi.spline(2, 2), hovi.Grid.uniform(1.0, 4, hovi.schemes.galerkin(2))

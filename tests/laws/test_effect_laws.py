@@ -241,12 +241,6 @@ def test_time_dependent_effects_are_detected(panda: Robot) -> None:
     assert Scene(panda, list(zero_strength_effects(panda).values())[:7]).terms.timed == ()
 
 
-def test_a_free_duration_is_refused_for_a_time_dependent_scene(two_link: Robot) -> None:
-    scene = Scene(two_link, [sample_effects(two_link)["moving_base"]])
-    with pytest.raises(SceneError, match="'moving_base' depends on time, which a free duration"):
-        plan(scene, [0.0, 0.0], [1.0, 0.0], (0.5, 2.0))
-
-
 # One's own
 
 

@@ -167,7 +167,6 @@ USUAL = {
 }
 """A value of each axis that goes with all others."""
 REFUSED: tuple[tuple[str, str, str, str], ...] = (
-    *(("via", via, "duration", "free") for via in ("configuration", "frame")),
     *(("via", via, "goal", "periodic") for via in ("configuration", "frame")),
     *(("goal", "periodic", "robot", name) for name in ("passive", "continuous", "free-flyer")),
     ("goal", "segments", "duration", "free"),
@@ -178,8 +177,6 @@ REFUSED: tuple[tuple[str, str, str, str], ...] = (
         ("robot", name, "world", "self-collision")
         for name in ("two_link", "moving base", "passive")
     ),
-    *((*timed, "duration", "free") for timed in (("robot", "moving base"), ("effect", "rolling"))),
-    ("world", "moving obstacle", "duration", "free"),
 )
 """Pairs of values that are refused, whatever the others are."""
 LEFT_OUT: set[Pair] = {frozenset([(a, x), (b, y)]) for a, x, b, y in REFUSED}
@@ -332,7 +329,7 @@ class Asked:
 
     @property
     def duration(self) -> Any:
-        texts = {"fixed": TIME, "text": "1250 ms", "free": (0.5 * TIME, 2.0 * TIME)}
+        texts = {"fixed": TIME, "text": "1250 ms", "free": (0.6 * TIME, 2.0 * TIME)}
         return texts[self.case["duration"]]
 
 

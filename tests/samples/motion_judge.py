@@ -45,7 +45,7 @@ def judged(
 
 
 def _duration(asked: Asked, T: float, elapsed: float) -> str:
-    low, high = (0.5 * TIME, 2.0 * TIME) if asked.case["duration"] == "free" else (TIME, TIME)
+    low, high = (0.6 * TIME, 2.0 * TIME) if asked.case["duration"] == "free" else (TIME, TIME)
     sequence = asked.case["goal"] == "segments" and asked.case["call"] != "study"
     more = 0.5 * TIME if sequence else 0.0
     inside = low + more - elapsed - 1e-9 <= T <= high + more - elapsed + 1e-9

@@ -21,7 +21,7 @@ from hovi.discrete.interval_batch import Coordinates, IntervalBatch, Jet, interv
 from hovi.discrete.interval_charts import charts_on, jet_on
 from hovi.errors import InputError, SchemeError
 from hovi.robot.space.chart import Chart
-from hovi.scene.lagrangian import Lagrangian, NoCost, PointTerms
+from hovi.scene.lagrangian import Lagrangian, NoCost, PointTerms, time_slope
 from hovi.scene.segmented_lagrangian import SegmentedLagrangian
 from hovi.schemes.scheme import regular_from_nodal
 from hovi.system.dataclass import dataclass
@@ -305,22 +305,53 @@ class DiscreteLagrangian:
         return [L.gradient(*jet, t=b.t, terms=term) for L, b, jet, term in parts]
 
     def duration_derivative(
-        self, path: DiscretePath, forces: list[PointTerms] | None = None
+        self,
+        path: DiscretePath,
+        forces: list[PointTerms] | None = None,
+        rates: Array | None = None,
     ) -> float:
-        """d S / d T of a stationary action S, at fixed nodal q and v and proportions of the steps.
+        """d S / d T of a stationary action S, at fixed nodal q and v; T changes the nodes' times.
 
-        T dS/dT = S - sum h w sum_j j dL/dq^(j) . q^(j) + sum_j j (D_{1+j} L_d . q0^(j) +
-        D_{k+1+j} L_d . q1^(j)), for L independent of time; it is minus Pontryagin's Hamiltonian.
+        With the lengths h of the intervals and the times t of the points it is the sum of
+        dS/dh dh/dT and of h w dL/dt dt/dT, with T dh/dT = h unless rates say something else; then,
+        for L independent of time, it is minus Pontryagin's Hamiltonian.
+        forces: as for `derivatives`. rates: dt/dT of the nodes, shape (N + 1,).
         """
-        total, k, rates = self.action(path), self.k, path.rates
+        nodes = self.grid.t
+        rates = nodes / self.grid.duration if rates is None else rates
+        total = float(np.diff(rates) @ self.step_derivatives(path, forces))
+        if not self._depends_on_time(forces):
+            return total
+        jets, batches = self.jets(path), self.batches
+        terms: Sequence[PointTerms | None] = forces or [None] * len(batches)
+        for L, batch, jet, term, w in zip(
+            self.lagrangians, batches, jets, terms, self.point_weights, strict=True
+        ):
+            moved = w * np.interp(batch.t, nodes, rates)
+            total += float(moved @ time_slope(L, jet, batch.t, term))
+        return total
+
+    def _depends_on_time(self, forces: list[PointTerms] | None) -> bool:
+        of_forces = any(each.time_gradient is not None for each in forces or ())
+        return of_forces or any(each.timed for each in self.lagrangians)
+
+    def step_derivatives(self, path: DiscretePath, forces: list[PointTerms] | None = None) -> Array:
+        """d S / d h of the length of every interval, shape (N,); as `duration_derivative`.
+
+        h dS/dh = L_d - sum h w sum_j j dL/dq^(j) . q^(j) + sum_j j (D_{1+j} L_d . q0^(j) +
+        D_{k+1+j} L_d . q1^(j)).
+        """
+        total, k, rates = self.values(path), self.k, path.rates
         gradients = self.point_gradients(path, forces)
-        for jet, g, w in zip(self.jets(path), gradients, self.point_weights, strict=True):
-            total -= float(w @ np.sum([j * np.vecdot(g[:, j], jet[j]) for j in range(1, k + 1)], 0))
+        points = self.point_weights, self.point_intervals
+        for jet, g, w, numbers in zip(self.jets(path), gradients, *points, strict=True):
+            work = np.sum([j * np.vecdot(g[:, j], jet[j]) for j in range(1, k + 1)], 0)
+            total -= np.bincount(numbers, w * work, self.grid.intervals)
         d = self.derivatives(path, forces)
         for j in range(1, k):
-            first, last = d[:, j] * rates[:-1, j - 1], d[:, k + j] * rates[1:, j - 1]
-            total += j * float(np.sum(first) + np.sum(last))
-        return total / self.grid.duration
+            total += j * np.vecdot(d[:, j], rates[:-1, j - 1])
+            total += j * np.vecdot(d[:, k + j], rates[1:, j - 1])
+        return np.asarray(total / self.grid.steps)
 
     def _check(self, path: DiscretePath, jets: list[Jet] | None = None) -> None:
         """Raise InputError for a path that does not fit the grid, or jets at other points."""

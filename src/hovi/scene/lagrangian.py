@@ -6,6 +6,7 @@ This is the only interface between CasADi and Pinocchio below it and NumPy and L
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -18,6 +19,9 @@ from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 
+DIFFERENCE = 6e-6
+"""Step of central differences in time, relative to the time, or in [s] where that is more."""
+
 
 @dataclass(frozen=True, eq=False)
 class PointTerms:
@@ -29,6 +33,8 @@ class PointTerms:
 
     jet_gradient, jet_weight: shape (P, (k+1) nv). output_gradient, output_weight: shape (P, m).
     leading_weight: shape (P, m, m); none when None.
+    time_gradient: of what depends on time itself, at a fixed jet and fixed outputs, shape (P,);
+        none when None.
     """
 
     jet_gradient: Array
@@ -36,6 +42,7 @@ class PointTerms:
     output_gradient: Array
     output_weight: Array
     leading_weight: Array | None = None
+    time_gradient: Array | None = None
 
     @classmethod
     def on_outputs(cls, gradient: Array, jet_size: int) -> PointTerms:
@@ -231,6 +238,22 @@ class NoCost(Lagrangian):
         """Zeros: see Lagrangian.evaluate."""
         P, rows, n = len(jet[0]), self.order + 1, self.nv
         return np.zeros(P), np.zeros((P, rows, n)), np.zeros((P, rows, n, rows, n))
+
+
+def over_time(function: Callable[[Array], Array], t: Array) -> Array:
+    """d function(t) / dt, by central differences. t: shape (P,), in [s]."""
+    d = DIFFERENCE * max(1.0, float(np.abs(t).max(initial=0.0)))
+    return np.asarray((function(t + d) - function(t - d)) / (2 * d))
+
+
+def time_slope(L: Lagrangian, jet: tuple[Array, ...], t: Array, terms: PointTerms | None) -> Array:
+    """dL/dt at a fixed jet, shape (P,). terms: contributions of limits and multipliers."""
+    slope = over_time(lambda t: L.value(*jet, t=t), t)
+    if terms is None:
+        return slope
+    if terms.output_gradient.any():
+        slope += np.vecdot(terms.output_gradient, over_time(lambda t: L.output(*jet, t=t), t))
+    return slope if terms.time_gradient is None else slope + terms.time_gradient
 
 
 def add_weights(hessian: Array, terms: PointTerms) -> None:

@@ -201,11 +201,6 @@ def test_an_end_in_the_way_of_the_ball_is_told_with_its_time(arm_scene: hovi.Sce
     assert "'ball' overlap" in solution.message
 
 
-def test_a_free_duration_refuses_moving_obstacles(arm_scene: hovi.Scene) -> None:
-    with pytest.raises(InputError, match="obstacle 'ball' moves at given times"):
-        hovi.plan(arm_scene, HANG, REACH, (1.0, 2.0), obstacles=[crossing()])
-
-
 def test_inverse_kinematics_looks_at_what_stands_still_only(panda: hovi.Robot) -> None:
     goal = hovi.FrameGoal("panda_hand_tcp", position=[0.45, 0.2, 0.4])
     options = {"obstacles": [hovi.Sphere([0.45, 0.2, 0.4], 0.3, path=CROSSING)]}

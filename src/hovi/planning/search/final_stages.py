@@ -9,8 +9,10 @@ from typing import TypeVar
 
 import numpy as np
 
-from hovi.discrete.grid import Grid
+from hovi.discrete.grid import DiscretePath, Grid
 from hovi.discrete.trajectory import Trajectory
+from hovi.optimize.start import Start
+from hovi.planning.problem.clock import Clock
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.problem.tolerance import Round, Tolerance
 from hovi.planning.refinement.adaptive import first_grid, refine_to_tolerance
@@ -56,10 +58,12 @@ class FinalStages:
     deadline: Deadline
     progress: Progress
 
-    def to_requested_grid(self, found: list[Solution], free: bool = False) -> list[Solution]:
+    def to_requested_grid(
+        self, found: list[Solution], clock: Clock | None = None
+    ) -> list[Solution]:
         """The best minima on the requested grid, ranked there.
 
-        free: whether each has a duration of its own; then their order is kept.
+        clock: of motions with durations of their own, whose order is kept.
 
         If the time left is too short for a few steps there, the best motion so far.
         """
@@ -67,8 +71,8 @@ class FinalStages:
             reached = f"the requested grid of {self.fine.grid.intervals:,} intervals was reached"
             why = f"the time limit leaves too little time for a solve before {reached}"
             return [ended_early(found[0], Status.TIME_LIMIT, why)]
-        if free:
-            return self._with_their_durations(found[:MAX_REFINED])
+        if clock is not None:
+            return self._with_their_durations(clock, found[:MAX_REFINED])
         problem = self.fine.problem()
         guesses = [guess_path(problem, s.trajectory) for s in found[:MAX_REFINED]]
         self.progress(f"refining {len(guesses)} of {len(found)} minima", 0.9)
@@ -80,12 +84,12 @@ class FinalStages:
             return [ended_early(found[0], Status.INTERRUPTED, why)]
         return distinct(solved.solutions)
 
-    def _with_their_durations(self, found: list[Solution]) -> list[Solution]:
+    def _with_their_durations(self, clock: Clock, found: list[Solution]) -> list[Solution]:
         """Each on the requested grid, stretched to its duration; minima come first."""
         self.progress(f"refining {len(found)} motions", 0.9)
-        solve_for = self._stretched(self.fine.grid)
+        solve_for = self._lasting(clock, self.fine.grid)
         refined = [
-            solve_for(each.trajectory.duration, each.trajectory)
+            solve_for(clock.length(each.trajectory.grid), each.trajectory)
             for each in self._until_deadline(found)
         ]
         return sorted(refined, key=lambda each: not each.success)
@@ -198,15 +202,16 @@ class FinalStages:
         from hovi.planning.search.free_to_tolerance import free_to_tolerance
         from hovi.planning.search.joint_duration import best_on_its_grid
 
-        solve_for = self._stretched(self.fine.grid)
+        on_grid = partial(self._lasting, free.clock)
         first = dataclasses.replace(solution, problem=on_grid_of(self.fine.problem(), solution))
         if not solution.success and solution.status is not Status.INFEASIBLE:
-            first = solve_for(self.fine.grid.duration, solution.trajectory)
+            length = free.clock.length(self.fine.grid)
+            first = on_grid(self.fine.grid)(length, solution.trajectory)
         jointly = partial(self._solve_jointly, free)
         if self.fine.tolerance is None:
-            return best_on_its_grid(free, self._stretched, first, jointly=jointly).with_time()
+            return best_on_its_grid(free, on_grid, first, jointly=jointly).with_time()
         refine = partial(self.refined, self.fine.tolerance, f"{which}: ")
-        return free_to_tolerance(free, self._stretched, refine, first, jointly)
+        return free_to_tolerance(free, on_grid, refine, first, jointly)
 
     def _solve_jointly(self, free: FreeDuration, first: Solution) -> Solution | None:
         """A minimum in the motion and the duration from a motion; None where not supported."""
@@ -218,15 +223,21 @@ class FinalStages:
             return None
         return joint_minimum(free, problem, path, most, left, True, self.fine.barrier)
 
-    def _stretched(self, grid: Grid) -> SolveFor:
-        """A solver on a grid that is scaled to each duration."""
+    def _lasting(self, clock: Clock, grid: Grid) -> SolveFor:
+        """A solver on a grid whose free part is stretched to each length."""
 
-        def solve_for(T: float, guess: Trajectory) -> Solution:
-            return self._solve(self.fine.on(grid.stretched(T)), guess)
+        def solve_for(length: float, guess: Trajectory) -> Solution:
+            job = self.fine.lasting(clock, length, grid)
+            if clock.whole:
+                return self._solve(job, guess)
+            order, now = job.grid.order, clock.length(guess.grid)
+            own = partial(guess.jet, order=max(order, 2))
+            path = job.problem().path(clock.curve(own, now, length, order))
+            return self._solve(job, Start(path, near=True))
 
         return solve_for
 
-    def _solve(self, job: Job, guess: Trajectory) -> Solution:
+    def _solve(self, job: Job, guess: Trajectory | Start[DiscretePath, None]) -> Solution:
         left, most = self.deadline.seconds_left, job.options.max_iterations
         return solve_on_grid(job.problem(), guess, max_iterations=most, time_limit=left)
 

@@ -20,6 +20,7 @@ import numpy as np
 
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError
+from hovi.planning.problem.clock import Clock
 from hovi.planning.search.continuation import STOPPED, how_ended
 from hovi.planning.solver.outcome.cost_with_time import price_of_time
 from hovi.planning.solver.solver import Solution
@@ -55,13 +56,15 @@ MAX_DURATIONS = 100
 class FreeDuration:
     """Bounds and weight of a free duration.
 
-    lower, upper: in [s]. weight: w, in cost per [s]; 0 minimises the cost alone.
+    lower, upper: of the length of the part that is free, in [s]. weight: w, in cost per [s]; 0
+        minimises the cost alone. clock: which part of the motion that is.
     Raises InputError unless 0 < lower < upper and the weight is finite and not negative.
     """
 
     lower: float
     upper: float
     weight: float = 0.0
+    clock: Clock = Clock()
 
     def __post_init__(self) -> None:
         if not (0 < self.lower < self.upper < np.inf):
@@ -74,8 +77,16 @@ class FreeDuration:
 
     @property
     def first(self) -> float:
-        """The first duration of the search: the geometric mean of the bounds, in [s]."""
+        """The first length of the search: the geometric mean of the bounds, in [s]."""
         return float(np.sqrt(self.lower * self.upper))
+
+    def length(self, solution: Solution) -> float:
+        """The length of the free part of a motion, in [s]."""
+        return self.clock.length(solution.trajectory.grid)
+
+    def slope(self, solution: Solution) -> float:
+        """J' + w of a minimum, in cost per [s]."""
+        return solution.derivative_in_time(self.clock.rates) + self.weight
 
     def probes(self, limited: bool) -> list[float]:
         """Other first durations, in [s], from the geometric mean to each bound.
@@ -154,14 +165,11 @@ def best_duration(
 
 @dataclass(frozen=True, eq=False)
 class _Trial:
-    """A solution for a duration.
-
-    duration: as requested, in [s]. weight: of time.
-    """
+    """A solution for a duration. duration: of its free part as requested, in [s]."""
 
     duration: float
     solution: Solution
-    weight: float
+    free: FreeDuration
 
     @property
     def success(self) -> bool:
@@ -171,12 +179,12 @@ class _Trial:
     @property
     def total(self) -> float:
         """J + w T."""
-        return action_of(self.solution) + self.weight * self.duration
+        return action_of(self.solution) + self.free.weight * self.duration
 
     @property
     def slope(self) -> float:
         """J' + w, in cost per [s]."""
-        return self.solution.duration_derivative + self.weight
+        return self.free.slope(self.solution)
 
     def downhill_to(self, other: _Trial) -> bool:
         """Whether J + w T decreases from here towards the duration of another trial."""
@@ -222,10 +230,10 @@ class _Search:
         self.stride = stride
         self.steps = first.nit
         self.durations = 0
-        T = float(np.clip(first.trajectory.duration, free.lower, free.upper))
+        T = float(np.clip(free.length(first), free.lower, free.upper))
         self.beyond: _Trial | None = None
         self.ending, self.at_jump = "", False
-        self._move_to(_Trial(T, first, free.weight))
+        self._move_to(_Trial(T, first, free))
 
     def run(self) -> BestDuration:
         """The motion at the best duration, or the best so far if the search ended early."""
@@ -346,7 +354,7 @@ class _Search:
         self.steps += solution.nit
         if solution.status in STOPPED:
             raise _StoppedError(solution.status, ended_search(solution.status))
-        return _Trial(T, solution, self.free.weight)
+        return _Trial(T, solution, self.free)
 
     def _at_an_edge(self) -> BestDuration:
         """The motion at a bound, or next to durations that failed or cost more."""
@@ -360,7 +368,7 @@ class _Search:
         status = beyond.solution.status
         if status is Status.INFEASIBLE:
             return dataclasses.replace(best, ending=f"{edge} found feasible, is", at_edge=True)
-        at = f"{beyond.duration:.6g} s, where less cost is expected"
+        at = f"{beyond.solution.trajectory.duration:.6g} s, where less cost is expected"
         return best.unfinished(status, f"for {at}, the solve ended in {status}")
 
 

@@ -18,6 +18,7 @@ from hovi.discrete.trajectory import Trajectory
 from hovi.effects import Effect
 from hovi.errors import ChartError
 from hovi.planning.conditions.asked import times_of
+from hovi.planning.problem.clock import Clock
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.goals import Via, held_goal, is_isolated
 from hovi.planning.problem.limits import Limits, as_limits
@@ -159,6 +160,10 @@ class Job:
     def on(self, grid: Grid) -> Self:
         """The job on another grid."""
         return dataclasses.replace(self, grid=grid)
+
+    def lasting(self, clock: Clock, length: float, grid: Grid | None = None) -> Self:
+        """The job on a grid whose free part has another length, in [s]; on its own if None."""
+        return self.on(clock.grid(self.grid if grid is None else grid, length))
 
     def graded(self, grid: Grid) -> Grid:
         """The grid with nodes where formulas of time change, unless the options name the grid."""

@@ -40,6 +40,9 @@ at a bound, at the edge of feasibility or next to a jump of the cost."""
 LARGEST_SLOPE_AT_JUMP = 1e-2
 """The same next to a jump of the cost, where limits or obstacles act at other instants for other
 durations, and the best duration is known only to JUMP_BRACKET."""
+SLOPE_AMONG_OBSTACLES = 1e-5
+"""The same where distances are bounded, at instants that change with the duration: a duration that
+is off by as much costs 1e-11 more."""
 SMALL_WEIGHT, SLOPE_OF_SMALL_WEIGHT = 1e-2, 1e-4
 """Weight w, relative to J / T, up to which the cost of the motion alone decides, and the largest
 slope then, relative to J / T: a duration longer by one percent costs less by 1e-6 at most."""
@@ -131,12 +134,15 @@ def best_on_its_grid(
 def is_best(found: BestDuration) -> bool:
     """Whether J' + w vanishes, or pushes against a bound, the edge of feasibility or a jump."""
     free = found.free
-    slope = found.solution.duration_derivative + free.weight
+    slope = free.slope(found.solution)
     density = abs(action_of(found.solution)) / found.solution.trajectory.duration
     small = free.weight <= SMALL_WEIGHT * density
     unit, largest = (density, SLOPE_OF_SMALL_WEIGHT) if small else (free.weight, LARGEST_SLOPE)
     if found.at_jump:
         largest = LARGEST_SLOPE_AT_JUMP
+    problem = found.solution.problem
+    if problem is not None and problem.distances is not None:
+        largest = max(largest, SLOPE_AMONG_OBSTACLES)
     return abs(slope) <= largest * unit or found.at_edge or _ending(free, found.solution) != ""
 
 
@@ -144,7 +150,7 @@ def unless_best(found: BestDuration, status: Status = Status.UNRESOLVED) -> Best
     """The motion, as a success only if its duration `is_best`. status: of the last search."""
     if not found.solution.success or is_best(found):
         return found
-    slope = found.solution.duration_derivative + found.free.weight
+    slope = found.free.slope(found.solution)
     better = "shorter" if slope > 0 else "longer"
     why = f" ({ended_search(status)})" if status in STOPPED else ""
     reason = f"{better} durations cost less by {abs(slope):.2g} per second{why}"
@@ -154,7 +160,7 @@ def unless_best(found: BestDuration, status: Status = Status.UNRESOLVED) -> Best
 
 def _ending(free: FreeDuration, solution: Solution) -> str:
     """Words of the message before the duration of a minimum, if that is the best; else ""."""
-    T, slope = solution.trajectory.duration, solution.duration_derivative + free.weight
+    T, slope = free.length(solution), free.slope(solution)
     bound = free.lower if slope > 0 else free.upper
     if abs(T / bound - 1) <= DURATION_PRECISION:
         return "The duration is kept at its bound,"

@@ -13,12 +13,11 @@ import numpy as np
 from hovi.checks.arguments import check_arguments_except
 from hovi.discrete.output.caution import COLLISION, LEFT_OUT, STATUS, WARNED, Caution
 from hovi.discrete.state import State, warn_of_degrees
-from hovi.errors import InputError, ModelError, SceneError, expect, warn
+from hovi.errors import InputError, ModelError, expect, warn
 from hovi.planning.clearance.distances import distances_between
 from hovi.planning.clearance.hull_overlaps import HullOverlap, hull_overlaps, met_sentence
 from hovi.planning.clearance.self_collisions import not_looked_at, pairs_left_out
-from hovi.planning.conditions.asked import checked
-from hovi.planning.conditions.places import AtTimes
+from hovi.planning.problem.clock import Clock
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.goals import Via
 from hovi.planning.problem.notation.ends import End, as_end
@@ -33,7 +32,7 @@ from hovi.planning.refinement.resolution import with_check
 from hovi.planning.search.branch_choice import Ends, chosen_ends, nearest_ends
 from hovi.planning.search.free_duration import FreeDuration
 from hovi.planning.search.group import in_group, with_others
-from hovi.planning.search.job import Job, grid_of, split_for_charts
+from hovi.planning.search.job import Job, grid_of, split_for_charts, stops_of
 from hovi.planning.search.least_duration import least_duration
 from hovi.planning.search.option_fields import spell_out
 from hovi.planning.search.options import PlanOptions
@@ -159,13 +158,13 @@ def _planned(
     given = start, goal
     chosen, apart = kept_apart(options.on(scene), scene.robot, ends_of(*given, options.via))
     deadline = Deadline(chosen.time_limit_seconds)
-    free, T = _time(scene, duration, chosen)
+    free, T = _time(duration, chosen)
     planning = _Planning(scene, *given, T, chosen, free)
     job = planning.job(nearest_ends(scene, *given, chosen), deadline)
-    for bound in () if free is None else (free.lower, free.upper):
-        job.grid.stretched(bound)  # raises for steps that are too short or too long
-    problem = job.problem()  # raises for invalid input before the search
-    longest = problem if free is None else problem.on(problem.grid.stretched(free.upper))
+    problem = longest = job.problem()  # raises for invalid input before the search
+    if free is not None:
+        job.lasting(free.clock, free.lower)  # raises for steps that are too short or too long
+        longest = job.lasting(free.clock, free.upper).problem()
     known = findings(longest, *given)
     warn_of_ends(scene.robot, job.start, job.goal, chosen, known.reason)
     for sentence in known.warnings:
@@ -338,37 +337,25 @@ class _Planning:
 
 
 def _time(
-    scene: Scene, T: float | tuple[float, float], options: PlanOptions
+    T: float | tuple[float, float], options: PlanOptions
 ) -> tuple[FreeDuration | None, float]:
     """The bounds of a free duration or None, and the duration of the first solve, in [s].
 
-    Raises SceneError for a free duration with effects that depend on time.
+    What is after the last via point is free.
     """
     if not isinstance(T, tuple):
         if options.time_weight != 0:
             raise InputError("time_weight needs a free duration: give a pair (lower, upper).")
         return None, T
-    if options.via:
-        raise InputError("via points need a fixed duration: give it as one number.")
-    for each in checked(options.conditions, scene.robot):
-        if isinstance(each.where, AtTimes) or each.timed:
-            raise InputError(
-                f"condition {each.name!r} depends on time, which a free duration does not allow; "
-                "give the duration as one number."
-            )
-    moving = [each.name for each in options.clearance.obstacles if each.motion is not None]
-    if moving:
+    clock = Clock(max(stops_of(options), default=0.0))
+    if clock.before >= T[0]:
         raise InputError(
-            f"obstacle {moving[0]!r} moves at given times, which a free duration does not allow; "
-            "give the duration as one number."
+            f"a via point or condition at {clock.before:g} s is not before the least duration, "
+            f"{T[0]:g} s: choose an earlier time, or longer durations."
         )
-    free = FreeDuration(*T, options.time_weight)
-    if scene.terms.timed:
-        raise SceneError(
-            f"effect {scene.terms.timed[0]!r} depends on time, which a free duration does not "
-            "allow; give the duration as one number."
-        )
-    return free, free.first
+    lower, upper = (bound - clock.before for bound in T)
+    free = FreeDuration(lower, upper, options.time_weight, clock)
+    return free, clock.duration(free.first)
 
 
 def _goal(goal: End, robot: Robot, options: PlanOptions) -> State | FrameGoal:

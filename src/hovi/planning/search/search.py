@@ -12,6 +12,7 @@ from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError
 from hovi.planning.clearance.clearance_violation import near_pairs
 from hovi.planning.paths.first_guesses import FirstGuesses, first_guesses
+from hovi.planning.problem.clock import Clock
 from hovi.planning.problem.presolve.ramps import graded_to_ramps
 from hovi.planning.refinement.error_estimate import with_metadata
 from hovi.planning.refinement.faults.narrow_features import NARROW
@@ -160,8 +161,10 @@ class Search:
             fine, best = tried[-1]
             if best.success or best.status in STOPPED or interrupted():
                 break
-            self.progress(f"no minimum for {fine.grid.duration:.4g} s, trying {T:.4g} s", 0.0)
-            tried.append(probing._probed(T))
+            next_one = free.clock.duration(T)
+            said = f"no minimum for {fine.grid.duration:.4g} s, trying {next_one:.4g} s"
+            self.progress(said, 0.0)
+            tried.append(probing._probed(free.clock, T))
         fine, first = min(tried, key=_rank)
         search = dataclasses.replace(self, fine=fine)
         job = search._coarse()
@@ -170,14 +173,15 @@ class Search:
             explored = search._explored(job) if several else Exploration([first], 1, False)
         best, minima = search._finished(job, explored)
         if best.status is Status.INFEASIBLE and len(tried) > 1:
-            others = f"{len(tried) - 1} other durations from {free.lower:g} to {free.upper:g} s"
+            lower, upper = (free.clock.duration(bound) for bound in (free.lower, free.upper))
+            others = f"{len(tried) - 1} other durations from {lower:g} to {upper:g} s"
             best = _with_note(best, f"Nor was one found for {others}.")
         return best, minima
 
-    def _probed(self, T: float) -> tuple[Job, Solution]:
-        """The job for another duration, and its solution from one start."""
+    def _probed(self, clock: Clock, length: float) -> tuple[Job, Solution]:
+        """The job for another length of its free part, and its solution from one start."""
         options = self.fine.options
-        fine = split_for_charts(self.fine.on(self.fine.grid.stretched(T)), options.guess)
+        fine = split_for_charts(self.fine.lasting(clock, length), options.guess)
         search = dataclasses.replace(self, fine=fine.with_options(starts=1))
         return fine, search._explored(search._coarse()).minima[0]
 
@@ -333,7 +337,8 @@ class Search:
             yield (found := stages.to_tolerance(self.fine.tolerance, found))
         elif job is not self.fine:
             raise_if_interrupted()
-            on_grid = stages.to_requested_grid(found, self.free is not None)
+            clock = None if self.free is None else self.free.clock
+            on_grid = stages.to_requested_grid(found, clock)
             yield (found := self._continued(self.fine, on_grid))
         yield (found := [stages.in_charts(found[0]), *found[1:]])
         if self.free is not None:

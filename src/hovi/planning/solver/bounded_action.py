@@ -28,7 +28,7 @@ from hovi.planning.solver.augmented_lagrangian_rounds import within
 from hovi.planning.solver.limits.limit_rows import LimitRows, push_rows
 from hovi.planning.solver.multipliers import Multipliers
 from hovi.planning.solver.point_outputs import PointOutputs
-from hovi.scene.lagrangian import PointTerms
+from hovi.scene.lagrangian import PointTerms, over_time
 
 Array = npt.NDArray[np.float64]
 
@@ -181,8 +181,33 @@ class BoundedAction(BoundedObjective[DiscretePath]):
         ]
         if self.more is not None:
             terms = self._with_more(x, terms, np.zeros_like(at_points), at_points, at_points)
+            if self._timed:
+                rates = self._rates_in_time(x, at_points[:, len(self.columns) :])
+                parts = zip(terms, self._parts, strict=True)
+                terms = [dataclasses.replace(t, time_gradient=rates[p]) for t, p in parts]
         known = self.action.multipliers
         return terms if known is None else known.added_to(terms)
+
+    @property
+    def _timed(self) -> bool:
+        """Whether further outputs or their bounds depend on time itself, or may."""
+        distances = self.problem.distances
+        moving = distances is not None and bool(distances.paths)
+        return moving or self.lagrangian.timed or any(each.timed for each in self.problem.bounds)
+
+    def _rates_in_time(self, x: DiscretePath, force: Array) -> Array:
+        """sum force d(y - bound)/dt of the further outputs at a fixed jet, (P,); force: (P, K)."""
+        more, times = self.more, np.concatenate(self.ld.point_times)
+        assert more is not None
+
+        def beyond(t: Array) -> Array:
+            jets = zip(self.ld.lagrangians, self.action.jets(x), self._parts, strict=True)
+            at = self._motion_at_points(x, [L.output(*jet, t=t[part]) for L, jet, part in jets])
+            low, high = more.bounds(t)
+            held = np.where(force > 0, high, np.where(force < 0, low, 0.0))
+            return more.values(dataclasses.replace(at, t=t)) - held
+
+        return np.asarray(np.vecdot(force, over_time(beyond, times)))
 
     def _with_more(
         self,

@@ -11,9 +11,10 @@ from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import numpy.typing as npt
 
 from hovi.checks.arguments import check_arguments
-from hovi.discrete.grid import DiscretePath
+from hovi.discrete.grid import DiscretePath, Grid
 from hovi.discrete.instants import Instants
 from hovi.discrete.measures.motion_effort import effort_of
 from hovi.discrete.measures.motion_segments import with_segment_names
@@ -64,6 +65,8 @@ from hovi.system.interruption import interruptible
 if TYPE_CHECKING:
     from hovi.planning.solver.central_path import CentralPath
     from hovi.planning.solver.receding.shift import Shift
+
+Array = npt.NDArray[np.float64]
 
 SOLVE_FRACTION = 0.6
 """Fraction of a time limit of `replan` and `advance` for the solve, before the checks."""
@@ -127,10 +130,17 @@ class Solution(SolutionSummary):
     def duration_derivative(self) -> float:
         """d cost / d T with all else fixed, per [s]: minus Pontryagin's Hamiltonian.
 
-        For an effort that does not depend on time. Raises InputError without a problem.
+        All intervals keep their proportions. Raises InputError without a problem.
+        """
+        return self.derivative_in_time(lambda grid: grid.t / grid.duration)
+
+    def derivative_in_time(self, rates: Callable[[Grid], Array]) -> float:
+        """d cost / d L where the times of the nodes depend on L, per [s].
+
+        rates: dt/dL of the nodes of a grid, shape (N + 1,). Raises InputError without a problem.
         """
         ld = at_instants(self._solved_problem, self.instants).ld
-        return ld.duration_derivative(self.trajectory.path, self.forces)
+        return ld.duration_derivative(self.trajectory.path, self.forces, rates(ld.grid))
 
     @check_arguments
     def replan(

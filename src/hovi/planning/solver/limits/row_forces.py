@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import dataclasses
 from functools import cache
 from typing import TYPE_CHECKING
 from weakref import WeakKeyDictionary
@@ -73,6 +74,9 @@ def joined(
     order = np.lexsort((s, k))
     jet, output = jet[order], output[order]
     joint = PointTerms(jet, np.zeros_like(jet), output, np.zeros_like(output))
+    if more[0].time_gradient is not None:
+        rates = np.append(np.zeros(len(instants)), more[0].time_gradient)[order]
+        joint = dataclasses.replace(joint, time_gradient=rates)
     return Instants(k[order], s[order], weights[order]), [joint]
 
 

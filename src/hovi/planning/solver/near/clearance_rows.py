@@ -9,6 +9,7 @@ semi-infinite program [HettichKortanek1993].
 from __future__ import annotations
 
 import copy
+import dataclasses
 from collections.abc import Sequence
 
 import numpy as np
@@ -33,7 +34,7 @@ from hovi.planning.solver.near.approaches import (
 )
 from hovi.planning.solver.near.expanded_rows import ExpandedRows, RowSums
 from hovi.planning.solver.near.recent_paths import RecentPaths
-from hovi.scene.lagrangian import PointTerms
+from hovi.scene.lagrangian import PointTerms, over_time
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]
@@ -119,15 +120,20 @@ class ClearanceRows:
             self._measured = self._measured.with_entry(path, beyond)
         return beyond
 
-    def _measured_excess(self, path: DiscretePath, chosen: Mask) -> Array:
-        """What distances exceed the least one by in chosen rows, (E,); NaN in others."""
+    def _measured_excess(
+        self, path: DiscretePath, chosen: Mask, times: Array | None = None
+    ) -> Array:
+        """What distances exceed the least one by in chosen rows, (E,); NaN in others.
+
+        times: of obstacles at the instants, instead of their own.
+        """
         instant, column = self._instant[chosen], self._column[chosen]
         used = np.zeros(len(self._wanted), dtype=bool)
         used[instant] = True
         place = (np.cumsum(used) - 1)[instant]
         wanted = np.zeros((int(place.max()) + 1, self._wanted.shape[1]), dtype=bool)
         wanted[place, column] = True
-        q, sizes = self._configurations(path)[used], self._sizes[used]
+        q, sizes = self._configurations(path, times)[used], self._sizes[used]
         normals = np.zeros((*wanted.shape, 3))
         normals[place, column] = self._normals[chosen]
         d = self._some.values(q, self._reach, wanted, sizes, normals)
@@ -166,7 +172,19 @@ class ClearanceRows:
         outputs = np.zeros((len(slope), 0))
         slope /= weights[:, None]
         terms = PointTerms(slope, np.zeros_like(slope), outputs, np.zeros_like(outputs))
+        if self.distances.paths:
+            rates = self._sums.by_instant(self.weights * multipliers * self._rates_in_time(path))
+            terms = dataclasses.replace(terms, time_gradient=rates / weights)
         return Instants(instants.numbers, instants.s, weights), [terms]
+
+    def _rates_in_time(self, path: DiscretePath) -> Array:
+        """dy/dt of every row at fixed configurations, as obstacles move, shape (E,)."""
+        all_of_them = np.ones(self.size, dtype=bool)
+
+        def excess(t: Array) -> Array:
+            return saturated(self._measured_excess(path, all_of_them, t))[0]
+
+        return over_time(excess, self._batch.t)
 
     def stand_behind(self, rows: LimitRows) -> None:
         """Take the place behind rows of limits, unless these are the ones that they have it behind.
@@ -333,9 +351,10 @@ class ClearanceRows:
         self._sizes = np.zeros(self._wanted.shape)
         self._sizes[self._instant, self._column] = rounding
 
-    def _configurations(self, path: DiscretePath) -> Array:
-        """q at the instants, as distances take it."""
-        return self._some.at(configurations(self._problem, path, self._batch), self._batch.t)
+    def _configurations(self, path: DiscretePath, times: Array | None = None) -> Array:
+        """q at the instants, as distances take it. times: of obstacles, instead of their own."""
+        t = self._batch.t if times is None else times
+        return self._some.at(configurations(self._problem, path, self._batch), t)
 
     @property
     def _reach(self) -> float:
