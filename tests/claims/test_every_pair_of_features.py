@@ -13,10 +13,7 @@ from samples.feature_judge import distances, judged, outcome
 pytestmark = pytest.mark.filterwarnings("ignore::hovi.errors.HoviWarning")
 REFUSED = {
     ("smooth", "free-flyer"),
-    ("free duration", "via"),
-    ("free duration", "moving obstacle"),
     ("free duration", "segments"),
-    ("free duration", "time-dependent effect"),
 }
 """The pairs that hovi refuses, in the order of FEATURES: leave out the one that no longer is."""
 
