@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import casadi as ca
 import numpy as np
 import numpy.typing as npt
 import pytest
@@ -12,6 +13,7 @@ import hovi
 from hovi.discrete.node_continuity import require_continuous
 from hovi.errors import InputError
 from hovi.planning.problem.seams import Seam, curve_through, holding
+from hovi.robot.space.configuration_space import ConfigurationSpace
 from samples.manifold_robots import with_arm
 from samples.small_robots import arm, with_shapes
 
@@ -118,6 +120,35 @@ def test_a_path_that_is_led_to_its_seams_is_a_path(base: str) -> None:
     np.testing.assert_allclose(robot.difference(middle, path.q[4]), 0.0, atol=1e-12)
     np.testing.assert_array_equal(path.v[4], 0.3)
     np.testing.assert_array_equal(path.q[[0, 1, 6, 8]], without.q[[0, 1, 6, 8]])
+
+
+@pytest.mark.parametrize("parts", [("SO(2)",), ("SO(3)",), ("SO(3)", "SO(2)", 1)])
+def test_a_lagrangian_about_no_robot_has_segments_on_groups(parts: tuple[str | int, ...]) -> None:
+    """c/2 |a|^2 of a left-invariant acceleration: turning about one axis, cubics as in one angle.
+
+    From rest at 0 by x at h to y at 2 h, with the weights c and d: with v at the middle free, it is
+    where c a = d a' on both sides, so that v = (3 c x + 3 d (y - x)) / (2 h (c + d)).
+    """
+    space = ConfigurationSpace(parts)
+    q, v, a = (
+        ca.SX.sym(name, n) for name, n in zip("qva", (space.nq, space.nv, space.nv), strict=True)
+    )
+    (c, d), h, axis = (1.0, 4.0), 0.5, np.zeros(space.nv)
+    axis[0] = 1.0
+    grid = hovi.Grid.uniform(h, 3, hovi.schemes.galerkin(2))
+    segments = [
+        hovi.DiscreteLagrangian(hovi.CasadiLagrangian([q, v, a], w * ca.sumsqr(a) / 2, space), grid)
+        for w in (c, d)
+    ]
+    neutral = {"SO(2)": [1.0, 0.0], "SO(3)": [0.0, 0.0, 0.0, 1.0], 1: [0.0]}
+    first = np.concatenate([neutral[part] for part in parts])
+    x, y = 0.7, 1.1
+    ends = [hovi.State(space.integrate(first, angle * axis)) for angle in (0.0, x, y)]
+    seam = Seam(h, hovi.State(ends[1].q, free_velocity=["all"]))
+    found = hovi.solve(hovi.TrajectoryProblem.of_segments(segments, ends[0], ends[2], via=(seam,)))
+    assert found.success, found.message
+    passed = 3 * (c * x + d * (y - x)) / (2 * h * (c + d))
+    np.testing.assert_allclose(found.trajectory.v[3], passed * axis, atol=1e-7)
 
 
 def test_a_passive_joint_is_free_where_a_frame_that_it_does_not_move_has_its_goal() -> None:

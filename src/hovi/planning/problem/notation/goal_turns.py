@@ -49,6 +49,8 @@ def keeping_turns(start: State, on: Coordinates, q0: Array, q: Array, turns: Arr
 
     From the start, whose configuration is q0, to q the shortest way, and by `turns` beyond it.
     """
+    if not on.space.flat and on.joint_names == on.coordinate_names:
+        return State(q)  # orientations that are nobody's joint cannot be named
     first = nearest_angles(q0, known_or(start.angles_on(on), remainder(q0, on.space)), on.space)
     return State(with_angles(q, first + on.difference(q0, q) + 2 * np.pi * turns, on))
 
