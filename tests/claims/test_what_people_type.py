@@ -91,3 +91,87 @@ def test_options_of_other_planners_are_answered(
     for again in (solution.replan, functools.partial(solution.advance, 0.5)):
         with pytest.raises(InputError, match=f"has no option {option!r}: .*{instead}"):
             again(**{option: "50 %"})
+
+
+@pytest.mark.parametrize(
+    ("power", "said"),
+    [
+        ("28 W", r"is '28 W': give a number such as 28, or a pair"),
+        ("watts", r"is 'watts': give a number such as 1, or a pair"),
+        ("50 %", r"no limit on the power of which that is a fraction: give a number, or a pair"),
+    ],
+)
+def test_a_power_in_words_is_answered_by_the_number(
+    scene: hovi.Scene, power: str, said: str
+) -> None:
+    with pytest.raises(InputError, match=said):
+        hovi.plan(scene, HOME, AWAY, 2.0, limits={"power": power})
+
+
+def test_conditions_in_a_scene_file_are_answered_by_how_they_are_given(tmp_path: Path) -> None:
+    file = tmp_path / "task.toml"
+    file.write_text(
+        f'robot = "ur5"\nstart = {HOME}\ngoal = {AWAY}\nduration = 2.0\n'
+        '[[conditions]]\nfunction = "tau * v"\nlower = -80\n'
+    )
+    with pytest.raises(hovi.HoviError, match=r"there is no key `conditions`: .*hovi\.plan_task\("):
+        hovi.load_task(file)
+    file.write_text(file.read_text().partition("[[")[0])
+    given = [hovi.Condition("tau * v", hovi.Between(-80, 80), name="power")]  # as the answer says
+    found = hovi.plan_task(hovi.load_task(file), conditions=given)
+    assert found.success
+    assert "power" in found.margins().conditions
+
+
+@pytest.mark.parametrize(
+    "function",
+    [
+        np.sin,
+        lambda q: np.dot(q, np.ones(6)),
+        lambda q: np.asarray(q).sum(),
+        lambda q: q[0] if q[0] > 0 else 0 * q[0],
+        lambda joints: joints,
+        lambda q: None,
+    ],
+)
+@pytest.mark.filterwarnings("ignore::FutureWarning")
+def test_a_function_of_arrays_is_answered_by_what_a_condition_takes(
+    scene: hovi.Scene, function: object
+) -> None:
+    given = hovi.Condition(function, hovi.Between(-9, 9))  # type: ignore[arg-type]
+    with pytest.raises(InputError, match=r"give a formula, .*, for NumPy, a hovi\.Function"):
+        hovi.plan(scene, HOME, AWAY, 2.0, conditions=[given])
+
+
+def test_a_solution_is_saved_as_its_motion(solution: hovi.Solution, tmp_path: Path) -> None:
+    solution.save(tmp_path / "a.npz")
+    solution.trajectory.save(tmp_path / "b.npz")
+    assert (tmp_path / "a.npz").read_bytes() == (tmp_path / "b.npz").read_bytes()
+    assert np.array_equal(hovi.Trajectory.load(tmp_path / "a.npz").q, solution.trajectory.q)
+
+
+@pytest.mark.parametrize(
+    ("name", "instead"),
+    [
+        ("load", r"hovi\.Trajectory\.load"),
+        ("save", r"solution\.save"),
+        ("replan", r"solution\.replan"),
+        ("advance", r"solution\.advance"),
+    ],
+)
+def test_functions_that_are_methods_are_answered(name: str, instead: str) -> None:
+    with pytest.raises(AttributeError, match=f"hovi has no {name!r}: use .*{instead}"):
+        getattr(hovi, name)
+
+
+def test_what_a_plan_leaves_out_of_its_guess_is_said(scene: hovi.Scene, tmp_path: Path) -> None:
+    asked = [hovi.Condition("q", hovi.Between(-9, 9), name="inside")]
+    limits = {"power": 500.0}
+    hovi.plan(scene, HOME, AWAY, 2.0, conditions=asked, limits=limits).save(tmp_path / "a.npz")
+    guess = hovi.Trajectory.load(tmp_path / "a.npz")
+    said = "The guess was planned with 'inside', 'power', which this plan leaves out"
+    without = hovi.plan(guess.scene, HOME, AWAY, 2.5, guess=guess)
+    assert said in without.message
+    assert any(said in each for each in without.trajectory.cautions)
+    again = hovi.plan(scene, HOME, AWAY, 2.5, guess=guess, conditions=asked, limits=limits)
+    assert "The guess was planned with" not in again.message

@@ -43,6 +43,20 @@ def test_without_ompl_the_direct_guess_is_the_only_one(
     assert "pip install 'hovi[obstacles]'" in said
 
 
+@pytest.mark.parametrize("ompl", [True, False])
+@pytest.mark.parametrize("success", [True, False])
+def test_without_obstacles_none_are_named(
+    two_link: Robot, monkeypatch: pytest.MonkeyPatch, ompl: bool, success: bool
+) -> None:
+    """Links that enter each other are no obstacles."""
+    monkeypatch.setattr(module, "has_ompl", lambda: ompl)
+    direct = problem_of(two_link, ball()).guess("cubic")
+    for paths in ((), (direct,)):
+        found = FirstGuesses(direct, 0.1, paths, obstacles=False)
+        said = found.sentence(True, success) + found.sentence(False, success)
+        assert "obstacles" not in said.replace("hovi[obstacles]", "")
+
+
 def test_a_failure_without_ompl_names_the_extra(
     two_link: Robot, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -17,7 +17,7 @@ from hovi.discrete.cells import CHANGE
 from hovi.dynamics.point_function import PointFunction
 from hovi.effects.expressions.enclosure import Enclosed, Enclosure
 from hovi.effects.expressions.interval_rules import Bound
-from hovi.errors import InputError, nearest, reason
+from hovi.errors import InputError, reason
 from hovi.planning.conditions.function import ARGUMENTS, Curvature, Function, Points, Slopes
 from hovi.robot.robot import Robot
 from hovi.robot.space import tangent
@@ -27,6 +27,10 @@ from hovi.robot.space.coordinates import Coordinates
 Array = npt.NDArray[np.float64]
 FunctionLike = str | Callable[..., Any] | Function
 """A formula, a function of CasADi symbols whose arguments are some of ARGUMENTS, or a Function."""
+_TAKEN = (
+    "give a formula, a function of CasADi symbols with names of q, v, a, tau and t, or, for NumPy, "
+    "a hovi.Function"
+)
 _JERK = "jerk", "j", "dtau", "torque_rate", "tau_rate"
 
 
@@ -231,18 +235,19 @@ def _called(given: Callable[..., Any], what: str, symbols: dict[str, ca.SX]) -> 
         if each not in ARGUMENTS:
             raise InputError(
                 f"{what}: its function takes {each!r}, which is none of q, v, a, tau and t: "
-                f"{nearest(each, ARGUMENTS)}"
+                f"{_TAKEN}."
             )
     try:
         y = given(*(symbols[each] for each in names))
     except Exception as error:  # a user's own function may raise anything
-        raise InputError(f"{what}: its function failed: {reason(error)}.") from error
+        said = reason(error)
+        raise InputError(f"{what}: its function failed: {said}; {_TAKEN}.") from error
     try:
         y = ca.SX(y) if not isinstance(y, list | tuple) else ca.vertcat(*map(ca.SX, y))
     except (NotImplementedError, TypeError, ValueError):
         raise InputError(
             f"{what}: its function must return a CasADi expression or a list of them, got "
-            f"{type(y).__name__}."
+            f"{type(y).__name__}: {_TAKEN}."
         ) from None
     if min(y.shape) != 1:
         raise InputError(

@@ -24,7 +24,7 @@ class FirstGuesses:
     """A direct guess, how deep in obstacles it is, in [m], and guesses along paths around them.
 
     branches: guesses to other configurations at the goal. isolated: whether these, and that of the
-        direct guess, are isolated there.
+        direct guess, are isolated there. obstacles: whether there are any, besides links.
     """
 
     direct: DiscretePath
@@ -32,6 +32,7 @@ class FirstGuesses:
     paths: tuple[DiscretePath, ...] = ()
     branches: tuple[DiscretePath, ...] = ()
     isolated: bool = False
+    obstacles: bool = True
 
     @property
     def all(self) -> tuple[DiscretePath, ...]:
@@ -45,22 +46,18 @@ class FirstGuesses:
         """
         if self.depth < DEEP:
             return ""
+        around = "around the obstacles" if self.obstacles else "on which links keep apart"
         if not has_ompl():
-            known = f"The direct guess is {self.depth:.2g} m deep in obstacles"
-            extra = "with OMPL (pip install 'hovi[obstacles]') a path around them is tried first."
+            where = "in obstacles" if self.obstacles else "where a link is in another"
+            known = f"The direct guess is {self.depth:.2g} m deep {where}"
+            extra = f"with OMPL (pip install 'hovi[obstacles]') a path {around} is tried first."
             return "" if success else f"{known}: {extra}"
         if not self.paths:
-            found = "OMPL found no path around the obstacles"
+            found = f"OMPL found no path {around}"
             return f"{found}; the direct guess led here." if success else f"{found}."
         if not success:
-            return (
-                "Neither OMPL's paths around the obstacles nor the direct guess led to a minimum."
-            )
-        led = (
-            "A path around the obstacles by OMPL"
-            if by_path
-            else "The direct guess, no path by OMPL,"
-        )
+            return f"Neither OMPL's paths {around} nor the direct guess led to a minimum."
+        led = f"A path {around} by OMPL" if by_path else "The direct guess, no path by OMPL,"
         return f"{led} led here."
 
 
@@ -81,11 +78,12 @@ def first_guesses(
         depth = depth_of(problem, direct)
     except OutOfTimeError:  # which the solve from it reports
         return FirstGuesses(direct)
+    obstacles = problem.clearance is not None and len(problem.clearance.obstacles) > 0
     if depth < DEEP or not has_ompl():
-        return FirstGuesses(direct, depth)
+        return FirstGuesses(direct, depth, obstacles=obstacles)
     progress("looking for paths around the obstacles", 0.0)
     paths = _drawn(problem, direct, deadline, min(max(starts - 1, 1), MAX_PATHS), seed)
-    return FirstGuesses(direct, depth, paths)
+    return FirstGuesses(direct, depth, paths, obstacles=obstacles)
 
 
 def _drawn(

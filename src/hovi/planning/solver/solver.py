@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
+import io
+import os
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable
@@ -125,6 +127,11 @@ class Solution(SolutionSummary):
         other costs and the price of time are left out. None without torques or inertia.
         """
         return effort_of(self.trajectory)
+
+    @check_arguments
+    def save(self, path: str | os.PathLike[str] | io.BytesIO, *, meshes: bool = True) -> None:
+        """Write the motion to one npz file, which hovi.Trajectory.load reads: see its `save`."""
+        self.trajectory.save(path, meshes=meshes)
 
     @cached_property
     def duration_derivative(self) -> float:

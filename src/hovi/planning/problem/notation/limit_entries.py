@@ -81,9 +81,12 @@ def _bounds(
         return _pair(kind, name, value)
     if kind == "q" or base is None:
         if kind != "q":
+            number, unit = number_and_unit(value) or (0.0, "")
+            of = f", but a base has no limit on the {kind} of which that is a fraction"
+            why, such = (of, "") if unit == "%" else ("", f" such as {number or 1.0:g}")
             raise InputError(
-                f"limits.{kind} of {name!r} is {value!r}, but a base has no limit on the {kind} of "
-                "which that is a fraction: give a number, or a pair lower < upper."
+                f"limits.{kind} of {name!r} is {value!r}{why}: give a number{such}, or a pair "
+                "lower < upper."
             )
         raise InputError(
             f"limits.{kind} of {name!r} is {value!r}, and a range of positions has no share: give "

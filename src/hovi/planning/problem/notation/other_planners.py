@@ -24,6 +24,9 @@ _ACCELERATIONS = (
     "give limits, such as {a} of those that the maker of an arm publishes, or numbers in rad/s^2"
 )
 _OPTIONS = {
+    "conditions": "conditions are given in Python, as in hovi.plan_task(hovi.load_task(file), "
+    'conditions=[hovi.Condition("tau * v", hovi.Between(-80, 80), name="power")]), but for '
+    "`limits.power`: see docs/howto/limits.md",
     "constraints": "give hovi.plan conditions of your own, such as "
     'conditions=[hovi.Condition("tau * v", hovi.Between(-80, 80), name="power")]: see '
     "docs/howto/limits.md",
