@@ -273,11 +273,12 @@ def _scenes() -> list[Call]:
     ]
     return [
         *(call(_scene_with(each.function), **dict(each.keywords)) for each in effects),
-        build(hovi.Scene, robot=robot(), effects=[], passive=("elbow",), compile=False),
+        build(hovi.Scene, robot=robot(), effects=[], passive=("elbow",), begin=0.5, compile=False),
         build(hovi.Scene, robot=robot(), effects={"gravity": {"acceleration": 9.81}}),
         own(scene(), "effort_lagrangian", weight=[1.0, 2.0], regular=True),
         own(scene(), "inverse_dynamics", *[np.zeros((3, 2))] * 3, np.zeros(3)),
         own(scene(), "without", "gravity"),
+        own(scene(), "from_time", 0.5),
         call(hovi.Scene.from_dict, scene().to_dict(), package_dirs=(), meshes={}),
         call(hovi.effects.register, hovi.effects.Gravity),
     ]

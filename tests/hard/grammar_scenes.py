@@ -178,6 +178,7 @@ OPTIONS: dict[str, Any] = {
     "smooth": FLAG,
     "tolerance": _leaf(1e-3, "1 mm", types="integer float text"),
     "passive": NAMES,
+    "begin": _leaf(0.5),
     "free_flyer": _leaf(False, types="boolean"),
     "mimic": FLAG,
     "locked": _row(["elbow"], {"elbow": 0.1}, items="text", types="list table", open_=True),
