@@ -32,6 +32,7 @@ class Rule:
 
 
 NOTICED = {
+    "curvature of the residual": "test_a_swing_up_in_one_interval_has_no_solution",
     "reopen slacks": "test_example_runs_headless[06_seven_joints]",
     "search again on the new grid": "test_the_code_of_a_page_runs[from_drake]",
     "another branch clear of links": "test_links_that_would_meet_count_in_the_choice",
@@ -444,6 +445,14 @@ _rule(
     "_Search._accepted",
     "fraction * min(-slope, LARGE_SLOPE) ** 2.3 > before**1.1",
     "False",
+)
+_at("equations", "optimize.restoration")
+_rule(
+    "curvature of the residual",
+    "After a Gauss-Newton step that failed, restoration takes Newton steps.",
+    "restore",
+    "_newton_step",
+    "_step",
 )
 _at("equations", "planning.solver.augmented_lagrangian_rounds")
 _rule(

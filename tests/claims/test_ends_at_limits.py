@@ -223,3 +223,33 @@ def test_what_is_excused_stays_with_a_saved_motion(tmp_path: Any) -> None:
     assert recorded["limit"] == "v"
     assert recorded["until"] == excused.until
     assert recorded["excess"] == excused.excess
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("room", [1e-6, 1e-7])
+def test_a_height_that_the_goal_has_but_for_a_micrometre_is_kept(seed: int, room: float) -> None:
+    """What the tolerance of the bound costs is an error that no grid reduces, and no fault of one.
+
+    The estimate covers the difference from a millimetre of room, which costs less.
+    """
+    rng = np.random.default_rng(seed)
+    scene = hovi.Scene(hovi.load_robot("ur5"), [hovi.effects.Gravity()])
+    start = np.array([0.0, -1.5, 1.5, 0.0, 0.0, 0.0]) + 0.1 * seed * rng.uniform(-1, 1, 6)
+    goal = np.array([1.0, -1.0, 1.0, 0.5, 0.5, 0.5]) + 0.1 * seed * rng.uniform(-1, 1, 6)
+    first, last = (scene.robot.frame_pose("tool0", q)[2, 3] for q in (start, goal))
+    sign = 1 if last > first else -1
+
+    def planned(room: float) -> hovi.Solution:
+        on = hovi.Between(**{"upper" if sign > 0 else "lower": last + sign * room})
+        height = hovi.Condition('position["tool0", "z"]', on, name="height", unit="m")
+        given = {"conditions": [height], "self_collision": False, "processes": 1}
+        return hovi.plan(scene, start, goal, 1.5, **given)
+
+    found, loose = planned(room), planned(1e-3)
+    assert found.status == "minimum", found.message
+    assert found.violation == ""
+    assert found.error_estimate is not None
+    within = found.error_estimate < 1e-3
+    assert within or "the tolerance of limits allows no smaller error" in found.message
+    assert loose.cost < found.cost * (1 + 1e-3)
+    assert abs(found.cost / loose.cost - 1) < 0.02

@@ -37,7 +37,7 @@ from hovi.planning.refinement.faults.on_curve import (
     fault_on_curve,
 )
 from hovi.planning.refinement.faults.remedy import remedy
-from hovi.planning.refinement.limit_sensitivity import limit_prices
+from hovi.planning.refinement.limit_sensitivity import cost_of_tolerance, limit_prices
 from hovi.planning.refinement.spinning import (
     fault_of_distance,
     fault_of_spinning,
@@ -179,7 +179,7 @@ def _checked(solution: Solution) -> tuple[Solution, str]:
     if not reason and solution.error_estimate is None and solution.accuracy is None:
         solution, reason, finer = _compared_with_finer(solution)
     elif not reason and not costs_nothing(solution):
-        reason = _fault_of_estimate(solution.error_estimate)
+        reason = _fault_of_estimate(solution)
     error = None if costs_nothing(solution) else solution.error_estimate
     for fault_of in (fault_of_spinning, fault_of_distance):
         reason = reason or fault_of(solution, error, finer)
@@ -343,11 +343,15 @@ def _compared_with_stationary(solution: Solution) -> tuple[Solution, str]:
     return compared, "" if change <= RESOLVED else _cost_change(change)
 
 
-def _fault_of_estimate(estimate: float | None) -> str:
-    """Why (b) or (c) does not hold by a known error estimate; "" if they do."""
-    if estimate is None:
+def _fault_of_estimate(solution: Solution) -> str:
+    """Why (b) or (c) does not hold by a known error estimate; "" if they do.
+
+    What the tolerance of limits costs is a part of the estimate that no grid changes.
+    """
+    if solution.error_estimate is None:
         return _NO_FINER_MINIMUM
-    return "" if estimate <= RESOLVED else _cost_change(estimate)
+    change = solution.error_estimate - cost_of_tolerance(solution)
+    return "" if change <= RESOLVED else _cost_change(change)
 
 
 def _cost_change(change: float) -> str:
