@@ -150,15 +150,15 @@ def rnea(name: str, motion: hovi.Trajectory, k: Any, q: Array, v: Array, a: Arra
 
 
 def effort(
-    name: str, motion: hovi.Trajectory, jet: Callable[[Any, Array], Sequence[Array]]
+    name: str, motion: hovi.Trajectory, jet: Callable[[Any, Array], Sequence[Array]], first: int = 0
 ) -> float:
-    """The integral of 1/2 |tau|^2 of the driven joints along a curve in the motion's intervals."""
+    """The integral of 1/2 |tau|^2 of the driven joints along a curve, from an interval on."""
     kind = kinds()[name]
     driven = np.delete(np.arange(kind.robot.nv), kind.scene.passive_coordinates)
     k, s = instants(motion, (GAUSS + 1) / 2)
     tau = rnea(name, motion, k, *jet(k, s))[:, driven]
     weights = np.repeat(motion.grid.steps, len(GAUSS)) * np.tile(WEIGHTS, motion.grid.intervals) / 2
-    return float(weights @ np.sum(tau**2, axis=1) / 2)
+    return float((weights * (k >= first)) @ np.sum(tau**2, axis=1) / 2)
 
 
 @pytest.mark.parametrize("limited", [False, True])
@@ -335,6 +335,25 @@ def test_a_sequence_of_stops_costs_what_its_motions_cost(name: str) -> None:
         assert motion.success, motion.message
         total += motion.cost
     assert found.cost == pytest.approx(total, rel=3e-4)
+
+
+@pytest.mark.parametrize("later", [False, True])
+@pytest.mark.parametrize("name", NAMES)
+def test_what_is_left_of_it_costs_what_it_has_not_cost_yet(name: str, later: bool) -> None:
+    """From a node of the first segment, and of the second, which has the seam behind it."""
+    found = planned(name)
+    motion = found.trajectory
+    node = seam(name, motion) + 3 if later else 3
+
+    def jet(k: Any, s: Array) -> Sequence[Array]:
+        return motion.sample_intervals(k, s)[:3]
+
+    left = found.advance(float(motion.t[node]))
+    assert left.success, left.message
+    apart = pin.difference(kinds()[name].robot.model, motion.q[node], left.trajectory.q[0])
+    assert np.abs(apart).max() < 1e-9
+    rest = effort(name, motion, jet, node)
+    assert left.cost == pytest.approx(rest, rel=1e-3, abs=1e-3 * found.cost)
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -78,6 +78,16 @@ def test_a_replan_makes_up_for_turns_after_the_last_seam_alone() -> None:
         np.testing.assert_allclose(angles(again, 2), [7.0, expected], atol=1e-9)
 
 
+@pytest.mark.parametrize("elapsed", [0.3, 0.8, 1.2])
+def test_what_is_left_of_a_sequence_keeps_its_turns(elapsed: float) -> None:
+    found = sequence([0.5, 7.0], [0.2, 14.0], [0.0, 0.0])
+    left = found.advance(elapsed)
+    assert left.success, left.message
+    t = np.linspace(0.0, found.trajectory.duration - elapsed, 9)
+    expected = found.trajectory.positions(elapsed + t)
+    np.testing.assert_allclose(left.trajectory.positions(t), expected, atol=1e-3)
+
+
 def test_a_guess_of_other_turns_makes_up_for_them_where_they_are_said() -> None:
     """Of two seams; the guess makes no turn at all."""
     straight = hovi.solve(via(*(hovi.State([0.2, x]) for x in (0.3, 0.8, 0.5))))
