@@ -20,7 +20,7 @@ import pytest
 
 import hovi
 from samples.manifold_robots import with_arm
-from samples.small_robots import arm, with_shapes
+from samples.small_robots import LENGTH, RADIUS, arm, with_shapes
 
 pytestmark = pytest.mark.filterwarnings("ignore::hovi.errors.HoviWarning")
 Array = npt.NDArray[np.float64]
@@ -354,6 +354,53 @@ def test_what_is_left_of_it_costs_what_it_has_not_cost_yet(name: str, later: boo
     assert np.abs(apart).max() < 1e-9
     rest = effort(name, motion, jet, node)
     assert left.cost == pytest.approx(rest, rel=1e-3, abs=1e-3 * found.cost)
+
+
+def nearest(kind: Kind, motion: hovi.Trajectory, center: Array) -> float:
+    """The least distance of the balls in the middle of all links from a point, in [m]."""
+    model, least = kind.robot.model, np.inf
+    data, middle = model.createData(), np.array([LENGTH / 2, 0.0, 0.0])
+    for q in motion.sample(np.linspace(0.0, motion.duration, 1001)).q:
+        pin.framesForwardKinematics(model, data, q)
+        for i in range(1, 4):
+            if model.existFrame(f"l{i}"):
+                at = data.oMf[model.getFrameId(f"l{i}")].act(middle)
+                least = min(least, float(np.linalg.norm(at - center)))
+    return least
+
+
+@pytest.mark.parametrize("later", [False, True])
+def test_it_keeps_clear_of_a_ball_that_is_in_its_way(later: bool) -> None:
+    """In the first segment, and in the second, in which a joint turns by more than half a turn."""
+    kind = Kind(
+        arm("c3", ("continuous", "revolute", "continuous")),
+        np.array([1.5, 0.6, 1.0]),
+        np.array([0.0, -0.5, 4.0]),
+        (1.5, 1.5),
+    )
+    load = hovi.effects.Payload(frame=kind.robot.tip_frame, mass=CARRIED)
+    segments = [
+        hovi.Segment(kind.goal(kind.middle), 1.5),
+        hovi.Segment(kind.goal(kind.last), 1.5, effects=[load]),
+    ]
+    armature = hovi.effects.Armature(0.05)
+    scene = hovi.Scene(kind.robot, [*kind.scene.effects, armature], compile=False)
+    options: dict[str, Any] = {"limits": {"base": "none", "v": 4.0}, "self_collision": False}
+    start = kind.robot.neutral()
+    free = hovi.plan_sequence(scene, start, segments, **options)
+    pose = kind.robot.frame_pose("l3", free.trajectory.sample([2.25 if later else 0.75]).q[0])
+    center, radius = (pose @ [LENGTH / 2, 0.0, 0.0, 1.0])[:3] + np.array([0.03, 0.02, 0.03]), 0.06
+    ball = hovi.Sphere(center, radius, name="ball")
+    found = hovi.plan_sequence(scene, start, segments, obstacles=[ball], margin=0.01, **options)
+    assert found.success, found.message
+    assert nearest(kind, free.trajectory, center) < radius + RADIUS
+    apart = nearest(kind, found.trajectory, center) - radius - RADIUS
+    assert apart > 0.01 - 1e-6
+    assert apart < 0.012
+    assert found.cost > free.cost
+    for node, change in ((1.5, kind.middle), (3.0, kind.last)):
+        q = found.trajectory.sample([node]).q[0]
+        assert np.abs(kind.robot.difference(kind.moved(change), q)).max() < 1e-9
 
 
 @pytest.mark.parametrize("name", NAMES)
