@@ -13,7 +13,6 @@ from samples.feature_judge import distances, judged, outcome
 pytestmark = pytest.mark.filterwarnings("ignore::hovi.errors.HoviWarning")
 REFUSED = {
     ("smooth", "free-flyer"),
-    ("free duration", "segments"),
 }
 """The pairs that hovi refuses, in the order of FEATURES: leave out the one that no longer is."""
 

@@ -169,7 +169,6 @@ USUAL = {
 REFUSED: tuple[tuple[str, str, str, str], ...] = (
     *(("via", via, "goal", "periodic") for via in ("configuration", "frame")),
     *(("goal", "periodic", "robot", name) for name in ("passive", "continuous", "free-flyer")),
-    ("goal", "segments", "duration", "free"),
     *(("robot", "free-flyer", *other) for other in (("smooth", "yes"), ("effect", "jerk"))),
     ("robot", "free-flyer", "effect", "rolling"),
     ("smooth", "yes", "effect", "jerk"),

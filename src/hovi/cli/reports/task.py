@@ -49,12 +49,17 @@ def describe_task(task: Task) -> str:
 def _segments(task: Task) -> list[str]:
     """The segments: when they end, where, and what is theirs alone."""
     from hovi.planning.problem.notation.ends import as_end
-    from hovi.planning.sequence.segment import names_of
+    from hovi.planning.problem.units import in_words
+    from hovi.planning.sequence.segment import duration_of_segment, names_of
 
     robot, lines, end = task.scene.robot, [], 0.0
+    free = isinstance(task.duration, tuple)
     for name, each in zip(names_of(task.segments), task.segments, strict=True):
-        begin, end = end, end + each.duration
-        lines.append(f"segment {name!r}: {each.duration:g} s, from {begin:g} to {end:g} s")
+        line = f"segment {name!r}: {in_words(duration_of_segment(each.duration))}"
+        if not free:
+            begin, end = end, end + each.seconds
+            line += f", from {begin:g} to {end:g} s"
+        lines.append(line)
         own = [effect.describe() for effect in each.effects]
         if each.limits is not None:
             own.append(f"limits {_limits(each.limits)}")
@@ -67,10 +72,11 @@ def _segments(task: Task) -> list[str]:
 
 def _duration(task: Task) -> str:
     """The duration, with its weight if it is free."""
-    if isinstance(task.duration, tuple):
-        low, high = task.duration
-        return f"{low:g} to {high:g} s, {task.options.time_weight:g} per second"
-    return f"{task.duration:g} s"
+    from hovi.planning.problem.units import in_words
+
+    priced = isinstance(task.duration, tuple)
+    weight = f", {task.options.time_weight:g} per second" if priced else ""
+    return in_words(task.duration) + weight
 
 
 def _end(goal: State | FrameGoal, name: str, robot: Robot) -> list[str]:

@@ -67,7 +67,7 @@ class Clock:
             t = np.asarray(t)
             part = (t > self.before) & (t < self.before + length)
             rate = np.where(part, now / length, 1.0)[:, None]
-            jet = curve(self.times(t, length, now))
+            jet = curve(np.clip(self.times(t, length, now), 0.0, self.duration(now)))
             return tuple(x * rate**j for j, x in enumerate(jet[: order + 1]))
 
         return moved

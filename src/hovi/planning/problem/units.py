@@ -100,6 +100,12 @@ def as_duration(given: Any) -> float | tuple[float, float]:
     return lower, upper
 
 
+def in_words(duration: float | tuple[float, float]) -> str:
+    """A duration in [s], or bounds of it, such as "1.5 s" and "1 to 4 s"."""
+    ends = duration if isinstance(duration, tuple) else (duration,)
+    return f"{' to '.join(f'{T:g}' for T in ends)} s"
+
+
 def _bounds(given: Any) -> tuple[float, float]:
     try:
         lower, upper = given

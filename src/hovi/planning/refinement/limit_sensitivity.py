@@ -48,9 +48,10 @@ def limit_prices(solution: Solution) -> Array:
         forces = np.concatenate([terms.jet_gradient, terms.output_gradient], axis=1)
         prices += _by_side(weights[:, None] * forces)
     if solution.instants is not None:
-        weights, terms = solution.instants.weights, solution.forces[len(at_points)]
+        weights, batches = solution.instants.weights, solution.forces[len(at_points) :]
+        forces = np.concatenate([each.jet_gradient for each in batches])
         by_interval = np.zeros((problem.grid.intervals, len(jet_range)))
-        np.add.at(by_interval, solution.instants.intervals, weights[:, None] * terms.jet_gradient)
+        np.add.at(by_interval, solution.instants.intervals, weights[:, None] * forces)
         prices[:, : len(jet_range)] += _by_side(by_interval)
     ranges = np.concatenate([jet_range, output_range])
     return np.asarray(prices * ranges / abs(solution.cost))

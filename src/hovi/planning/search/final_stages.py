@@ -23,7 +23,9 @@ from hovi.planning.refinement.inactive_limits import (
     without_limits,
 )
 from hovi.planning.search.free_duration import FreeDuration, SolveFor
+from hovi.planning.search.free_segments import FreeSegments, best_segments, lengths_in_words
 from hovi.planning.search.job import Job, split_for_charts
+from hovi.planning.search.joint_duration import OnGrid
 from hovi.planning.search.multistart import Pool, default_processes, distinct
 from hovi.planning.solver.initial_path import guess_path
 from hovi.planning.solver.solver import Solution, solve_on_grid
@@ -42,6 +44,8 @@ MAX_REFINED = 6
 MAX_FEATURE_ROUNDS, MAX_FEATURE_INTERVALS = 6, 600
 """Maximum number of grids with nodes where a minimum has narrow features, and of their intervals.
 """
+MAX_GRIDS = 4
+"""Maximum number of grids on which the best durations of segments are searched for."""
 LEAST_STEPS = 2
 """Number of steps on the requested grid without time for which it is not tried."""
 _Each = TypeVar("_Each")
@@ -117,6 +121,28 @@ class FinalStages:
             self.progress(f"best duration of {which}", 0.9)
             results.append(self._with_best_duration(free, solution, which))
         return distinct(results)
+
+    def with_best_segments(self, free: FreeSegments, found: Solution) -> Solution:
+        """A minimum with the best durations of its segments, to the tolerance if there is one."""
+        job, steps, tolerance = self.fine, 0, self.fine.tolerance
+        best = dataclasses.replace(found, problem=on_grid_of(job.problem(), found))
+        for _ in range(MAX_GRIDS):
+            job, best = best_segments(free, job, best, self._solver_of)
+            steps += best.nit
+            if tolerance is None or not best.success:
+                break
+            refined = dataclasses.replace(self, fine=job).refined(tolerance, "", best)
+            settled = refined.trajectory.grid is best.trajectory.grid
+            best = refined
+            if settled or not refined.success:
+                break
+        said = best.message
+        if best.success and tolerance is None:
+            said = f"a minimum of cost {best.cost:.10g} after {steps} steps."
+        return dataclasses.replace(best, nit=steps, message=f"{said} {lengths_in_words(job)}")
+
+    def _solver_of(self, job: Job, clock: Clock) -> OnGrid:
+        return partial(dataclasses.replace(self, fine=job)._lasting, clock)
 
     def in_charts(self, best: Solution) -> Solution:
         """The solution on a grid on which no orientation turns by more than pi in an interval.

@@ -162,8 +162,24 @@ class Job:
         return dataclasses.replace(self, grid=grid)
 
     def lasting(self, clock: Clock, length: float, grid: Grid | None = None) -> Self:
-        """The job on a grid whose free part has another length, in [s]; on its own if None."""
-        return self.on(clock.grid(self.grid if grid is None else grid, length))
+        """The job on a grid whose free part has another length, in [s]; on its own if None.
+
+        Goals of segments and limits move along with the ends of the segments.
+        """
+        longer = self.on(clock.grid(self.grid if grid is None else grid, length))
+        if not self.segments:
+            return longer
+        now, limits = clock.length(self.grid), self.options.limits
+        ends = clock.times(np.array(self.ends), now, length)
+        fractions = (*(ends / longer.grid.duration).tolist(), 1.0)
+        times = clock.times(np.array([each.time for each in self.options.via]), now, length)
+        via = zip(self.options.via, times.tolist(), strict=True)
+        changes: dict[str, Any] = {"via": [dataclasses.replace(x, time=t) for x, t in via]}
+        if isinstance(limits, Limits) and limits.parts:
+            changes["limits"] = Limits.of_segments(limits.parts, ends.tolist())
+        own = zip(self.segments, fractions, strict=True)
+        segments = tuple(dataclasses.replace(each, end=end) for each, end in own)
+        return dataclasses.replace(longer.with_options(**changes), segments=segments)
 
     def graded(self, grid: Grid) -> Grid:
         """The grid with nodes where formulas of time change, unless the options name the grid."""

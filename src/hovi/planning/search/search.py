@@ -31,6 +31,7 @@ from hovi.planning.search.final_stages import (
     with_tolerance,
 )
 from hovi.planning.search.free_duration import FreeDuration
+from hovi.planning.search.free_segments import FreeSegments
 from hovi.planning.search.job import Job, split_for_charts
 from hovi.planning.search.multistart import Exploration, Pool, default_processes, explore
 from hovi.planning.solver.initial_path import guess_path
@@ -64,6 +65,7 @@ class Search:
     free: FreeDuration | None = None
     without: Job | None = None
     ends: Ends | None = None
+    segments: FreeSegments | None = None
 
     def run(self) -> tuple[Solution, tuple[float, ...]]:
         """The best solution, and the costs of all minima on the requested grid.
@@ -234,7 +236,7 @@ class Search:
         refused: the solution as unresolved, which is returned if no tolerance helps.
         """
         given = self.fine.tolerance
-        if given is None or self.free is not None or refused.status is not Status.UNRESOLVED:
+        if given is None or self._free or refused.status is not Status.UNRESOLVED:
             return refused
         stages = FinalStages(self.fine, self.deadline, self.progress)
         for finer in given.finer:
@@ -254,7 +256,7 @@ class Search:
         refused: the solution with the reason. It is kept where there is no such motion.
         """
         tolerance = self.fine.tolerance
-        if tolerance is None or self.free is not None or NARROW not in refused.message:
+        if tolerance is None or self._free or NARROW not in refused.message:
             return refused
         stages = FinalStages(self.fine, self.deadline, self.progress)
         try:
@@ -262,6 +264,11 @@ class Search:
         except OutOfTimeError:
             return refused
         return refused if seen is solution else resolved(seen)
+
+    @property
+    def _free(self) -> bool:
+        """Whether any duration is free."""
+        return self.free is not None or (self.segments is not None and self.segments.any)
 
     def _with_duration(self, refused: Solution) -> Solution:
         """The solution, which says its duration if that is free, also where a check refused it."""
@@ -344,6 +351,9 @@ class Search:
         if self.free is not None:
             raise_if_interrupted()
             yield stages.with_best_durations(self.free, found)
+        if self.segments is not None and self.segments.any and found[0].success:
+            raise_if_interrupted()
+            yield [stages.with_best_segments(self.segments, found[0])]
 
     def _with_ending(self, best: Solution, explored: Exploration) -> Solution:
         """The best solution, with a note in its message if the search ended early."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import KW_ONLY, fields
@@ -21,7 +22,8 @@ from hovi.errors import InputError
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.limits import Limits
 from hovi.planning.problem.notation.ends import End, as_end
-from hovi.planning.problem.units import SECONDS_IN_WORDS, seconds
+from hovi.planning.problem.units import SECONDS_IN_WORDS, Duration, as_duration, seconds
+from hovi.planning.search.job import stops_of
 from hovi.planning.search.options import PlanOptions
 from hovi.robot.robot import Robot
 from hovi.system.dataclass import dataclass
@@ -41,7 +43,7 @@ class Segment:
         FrameGoal, or a table as for `hovi.plan`. The motion stops there unless the goal gives
         velocities or leaves them free (`free_velocity`), and it does not stop where there is none
         (None).
-    duration: T in [s], or a text such as "1.5 s".
+    duration: T in [s], or a text such as "1.5 s"; or a pair (lower, upper) of these for a free one.
     effects: what acts in this segment besides the effects of the scene, such as the payload that is
         carried, also as tables by name; one of a kind that the scene has takes its place.
     limits: of this segment, as for `hovi.plan`; those of the options if None.
@@ -51,7 +53,7 @@ class Segment:
     """
 
     goal: End | None
-    duration: float
+    duration: Duration
     _: KW_ONLY
     effects: Sequence[Effect] = ()
     limits: str | Limits | Mapping[str, Any] | None = None
@@ -59,10 +61,7 @@ class Segment:
 
     def __post_init__(self) -> None:
         require_name(self.name, "a segment")
-        T = seconds(self.duration, "the duration of a segment")
-        if not (math.isfinite(T) and T > 0):
-            raise InputError(f"the duration of a segment must be positive, got {T} s.")
-        object.__setattr__(self, "duration", T)
+        object.__setattr__(self, "duration", duration_of_segment(self.duration))
         object.__setattr__(self, "effects", as_effects(self.effects))
         if self.goal is not None and not isinstance(self.goal, State | FrameGoal | str | Mapping):
             numbers_of("the goal of a segment", self.goal)
@@ -71,6 +70,22 @@ class Segment:
                 "the limits of a segment are 'urdf', 'none', the name of an arm, a mapping or a "
                 f"hovi.Limits, not {shown(self.limits)}."
             )
+
+    @property
+    def seconds(self) -> float:
+        """T of a segment whose duration is given, in [s]."""
+        assert isinstance(self.duration, float | int)
+        return float(self.duration)
+
+
+def duration_of_segment(given: Any) -> float | tuple[float, float]:
+    """A duration in [s], or the bounds of a free one. Raises InputError."""
+    if isinstance(given, list | tuple):
+        return as_duration(given)
+    T = seconds(given, "the duration of a segment")
+    if not (math.isfinite(T) and T > 0):
+        raise InputError(f"the duration of a segment must be positive, got {T} s.")
+    return T
 
 
 Table = Segment | Mapping[str, Any]
@@ -100,9 +115,22 @@ def names_of(segments: Sequence[Segment]) -> tuple[str, ...]:
     return tuple(each.name or f"segment {i}" for i, each in enumerate(segments, start=1))
 
 
-def duration_of(segments: Sequence[Segment]) -> float:
-    """The duration of a sequence, in [s]."""
-    return float(sum(each.duration for each in segments))
+def durations_of(segments: Sequence[Segment]) -> tuple[float | tuple[float, float], ...]:
+    """The duration of each segment, in [s], or its bounds."""
+    return tuple(duration_of_segment(each.duration) for each in segments)
+
+
+def duration_of(segments: Sequence[Segment]) -> float | tuple[float, float]:
+    """The duration of a sequence, in [s], or its bounds where that of a segment is free."""
+    each = durations_of(segments)
+    lower, upper = np.sum([T if isinstance(T, tuple) else (T, T) for T in each], axis=0)
+    return (float(lower), float(upper)) if lower < upper else float(lower)
+
+
+def with_durations(segments: Sequence[Segment], durations: Sequence[float]) -> tuple[Segment, ...]:
+    """The segments with given durations."""
+    pairs = zip(segments, durations, strict=True)
+    return tuple(dataclasses.replace(each, duration=T) for each, T in pairs)
 
 
 def goals_of(segments: Sequence[Segment], robot: Robot) -> tuple[State | FrameGoal | None, ...]:
@@ -140,8 +168,14 @@ def checked_segments(segments: Any, options: PlanOptions) -> tuple[Segment, ...]
                     f"the goal of {name!r} takes no `{key}`, since accelerations are free where "
                     "segments meet: leave it out."
                 )
-    if options.time_weight != 0:
+    free = isinstance(duration_of(segments), tuple)
+    if options.time_weight != 0 and not free:
         raise InputError("time_weight needs a free duration, and those of segments are fixed.")
+    if free and len(segments) > 1 and stops_of(options):
+        raise InputError(
+            "via points and conditions at given times need segments of given durations: make them "
+            "goals of segments, or give each duration as one number."
+        )
     if options.turns is not None:
         raise InputError(
             "a sequence takes no `turns`: give them to the goal of a segment, "

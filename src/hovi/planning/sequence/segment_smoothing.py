@@ -41,7 +41,7 @@ def smoothed_segments(
     Raises InputError as `smoothed` does.
     """
     still = _standing_still(scene.robot, start, moves, len(segments))
-    durations = smoothed_durations([each.duration for each in segments], still)
+    durations = smoothed_durations([each.seconds for each in segments], still)
     found = [smoothed(scene, start, moves[-1].goal, T) for T in durations]
     return found[0], tuple(
         JobSegment(segment.end, _with_default(each.effects[-1], segment.acting))

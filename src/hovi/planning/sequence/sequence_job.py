@@ -43,7 +43,7 @@ def job_of(
     goals: of the segments, two or more. options: resolved for the scene's robot.
     Raises InputError, SceneError or UnreachableError for what defines no sequence.
     """
-    ends = tuple(accumulate(each.duration for each in segments))
+    ends = tuple(accumulate(each.seconds for each in segments))
     job_segments = tuple(
         JobSegment(end / ends[-1], Acting(tuple(each.effects)))
         for each, end in zip(segments, ends, strict=True)
@@ -101,7 +101,7 @@ def sequence_grid(segments: Sequence[Segment], options: PlanOptions, order: int)
     Intervals are of nearly equal length, but every segment has one, or LEAST_INTERVALS where the
     grid is not given.
     """
-    durations = np.array([each.duration for each in segments])
+    durations = np.array([each.seconds for each in segments])
     total, least = options.interval_count, 1
     if options.tolerance is not None:
         least = LEAST_INTERVALS

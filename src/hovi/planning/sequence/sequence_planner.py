@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import time
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any, ParamSpec, Protocol, cast
 
 from hovi.checks.arguments import check_arguments_except
@@ -13,8 +14,10 @@ from hovi.errors import InputError, expect
 from hovi.planning.problem.notation.ends import End as Start
 from hovi.planning.problem.notation.ends import as_end
 from hovi.planning.refinement.faults.cautions import keeping_warnings
+from hovi.planning.search.continuation import STOPPED
+from hovi.planning.search.free_segments import FreeSegments
 from hovi.planning.search.group import in_group, with_others
-from hovi.planning.search.job import Acting
+from hovi.planning.search.job import Acting, Job
 from hovi.planning.search.option_fields import spell_out
 from hovi.planning.search.options import PlanOptions
 from hovi.planning.search.planner import (
@@ -27,7 +30,15 @@ from hovi.planning.search.planner import (
 )
 from hovi.planning.search.search import Search
 from hovi.planning.sequence.branches import End
-from hovi.planning.sequence.segment import Segment, Table, checked_segments, goals_of, names_of
+from hovi.planning.sequence.segment import (
+    Segment,
+    Table,
+    checked_segments,
+    durations_of,
+    goals_of,
+    names_of,
+    with_durations,
+)
 from hovi.planning.sequence.sequence_job import job_of
 from hovi.planning.solver.outcome.without_solve import unresolved_at_once
 from hovi.planning.solver.solver import Solution
@@ -125,16 +136,36 @@ def plan_sequence(
     names = (f"the goal of {name!r}" for name in names_of(checked))
     stops = ends_of(begin, None, chosen.via) | dict(zip(names, goals, strict=True))
     chosen, apart = kept_apart(chosen.on(scene), scene.robot, stops)
-    job = job_of(scene, begin, goals, checked, chosen)
+    free = FreeSegments.of(durations_of(checked), chosen.time_weight)
+    planned = partial(_planned, scene, begin, goals, checked, chosen, deadline, progress or silent)
+    for durations in free.first:
+        found, job = planned(free, durations, began)
+        if found.success or found.status in STOPPED:
+            break
+    scenes = [each.acting.on(job.scene) for each in job.segments]
+    return _named(with_notes(found, scenes, job.options, apart), checked)
+
+
+def _planned(
+    scene: Scene,
+    start: End,
+    goals: Sequence[End | None],
+    segments: Sequence[Segment],
+    options: PlanOptions,
+    deadline: Deadline,
+    progress: Progress,
+    free: FreeSegments,
+    durations: Sequence[float],
+    began: float,
+) -> tuple[Solution, Job]:
+    """The motion in several segments from given durations on, and its job."""
+    job = job_of(scene, start, goals, with_durations(segments, durations), options)
     job.problem()  # raises for invalid input before the search
     warn_of_ends(scene.robot, job.start, job.goal, job.options)
-    without = job.with_options(self_collision=False) if chosen.self_collision else None
-    scenes = [each.acting.on(job.scene) for each in job.segments]
+    without = job.with_options(self_collision=False) if options.self_collision else None
     if fault := job.fault_of_time:
-        solution = unresolved_at_once(job.problem(), job.options.guess, fault)
-    else:
-        solution = run(Search(job, deadline, progress or silent, None, without), began)
-    return _named(with_notes(solution, scenes, job.options, apart), checked)
+        return unresolved_at_once(job.problem(), job.options.guess, fault), job
+    return run(Search(job, deadline, progress, None, without, None, free), began), job
 
 
 def _alone(

@@ -18,6 +18,7 @@ from hovi.planning.obstacles.preparation import prepared_within
 from hovi.planning.problem.tolerance import Tolerance
 from hovi.planning.problem.units import as_duration
 from hovi.planning.search.options import INTERVALS_TWICE, TOLERANCE_AND_SCHEME, PlanOptions
+from hovi.planning.sequence.segment import duration_of
 from hovi.planning.task_file.effect_tables import read_effects
 from hovi.planning.task_file.goal_tables import Begin, read_end, read_via
 from hovi.planning.task_file.limit_tables import read_limits
@@ -85,7 +86,7 @@ def task_of(data: Mapping[str, Any], toml: TomlText, cache: SceneCache | None = 
     begin, note = Begin(table.group, start), _note(table, robot, toml)
     if table.segments:
         segments = read_segments(table.segments, held, toml, begin)
-        whole = sum(each.duration for each in segments)
+        whole = duration_of(segments)
         options = _options(table, whole, held, grasped, toml)
         task = Task.of_segments(scene, start, segments, options, name)
         return dataclasses.replace(task, note=note)

@@ -200,7 +200,7 @@ class SegmentTable(Table):
     """[[segments]]: the segments of a sequence."""
 
     name: str = Field(default="", description="a text")
-    duration: PositiveSeconds = Field(description=SECONDS_IN_WORDS)
+    duration: Duration = Field(description=DURATION_IN_WORDS)
     goal: Goal = Field(default=None, description=_END.format("[segments.goal]"))
     limits: Any = Field(
         default=None, description='"urdf", "soft", "none", the name of an arm or a table of limits'

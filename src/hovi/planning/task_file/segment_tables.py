@@ -7,9 +7,13 @@ from typing import Any
 
 from hovi.errors import InputError
 from hovi.planning.problem.notation.ends import as_end
-from hovi.planning.problem.units import seconds
 from hovi.planning.search.options import PlanOptions
-from hovi.planning.sequence.segment import Segment, checked_segments, names_of
+from hovi.planning.sequence.segment import (
+    Segment,
+    checked_segments,
+    duration_of_segment,
+    names_of,
+)
 from hovi.planning.task_file.effect_tables import effect_table, read_effects
 from hovi.planning.task_file.goal_tables import NO_GROUP, Begin, end_table, read_end
 from hovi.planning.task_file.limit_tables import limits_value, read_limits
@@ -49,7 +53,7 @@ def _read_segment(
     keys = ("segments", number)
     goal, limits = table.goal, table.limits
     try:
-        duration = seconds(table.duration, "the duration of a segment")
+        duration = duration_of_segment(table.duration)
     except InputError as wrong:
         raise toml.error((*keys, "duration"), str(wrong)) from None
     return Segment(
@@ -70,7 +74,8 @@ def segments_value(segments: Sequence[Segment], robot: Robot) -> list[dict[str, 
 def _segment_table(segment: Segment, name: str, robot: Robot) -> dict[str, Any]:
     """The table of a segment. name: of it in messages."""
     table: dict[str, Any] = {"name": segment.name} if segment.name else {}
-    table["duration"] = segment.duration
+    T = segment.duration
+    table["duration"] = list(T) if isinstance(T, tuple) else T
     if segment.limits is not None:
         table["limits"] = limits_value(segment.limits, robot)
     if segment.goal is not None:

@@ -12,7 +12,7 @@ from hovi.discrete.state import State
 from hovi.errors import InputError, warn
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.notation.ends import as_end
-from hovi.planning.problem.units import as_duration
+from hovi.planning.problem.units import as_duration, in_words
 from hovi.planning.search.option_fields import option_infos
 from hovi.planning.search.options import PlanOptions
 from hovi.planning.sequence.segment import (
@@ -61,13 +61,13 @@ class Task(Summarized):
         if self.segments and self.duration != duration_of(self.segments):
             raise InputError(
                 f"the duration of a sequence is that of its segments, "
-                f"{duration_of(self.segments):g} s, got {self.duration}: change theirs."
+                f"{in_words(duration_of(self.segments))}, got {self.duration}: change theirs."
             )
         self.options.on(self.scene)
 
     def _summary(self) -> Summary:
-        T = self.duration
-        bounds = f"{T[0]:g} to {T[1]:g} s, free" if isinstance(T, tuple) else f"{T:g} s"
+        free = ", free" if isinstance(self.duration, tuple) else ""
+        bounds = f"{in_words(self.duration)}{free}"
         effects = ", ".join(each.key for each in self.scene.effects)
         rows = [("robot", self.scene.robot.name), ("effects", effects), ("duration", bounds)]
         if self.segments:

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from hovi.planning.solver.limits.limit_rows import LimitRows, RowsAtNodes
 
 Array = npt.NDArray[np.float64]
+Mask = npt.NDArray[np.bool_]
 
 _AT_INSTANTS: WeakKeyDictionary[DiscreteLagrangian, DiscreteLagrangian] = WeakKeyDictionary()
 """The last discrete Lagrangian with further instants of each one, with what it has computed."""
@@ -35,9 +36,9 @@ def forces_of(
     """The multipliers of control points as forces on (q, v, ...) at instants of every interval.
 
     multipliers: of the rows, shape (E,). The terms follow those at the quadrature points, one per
-    batch of instants: one without segments.
+    batch of instants: see `by_segment`.
     """
-    if rows.size == 0 or problem.ld.segments is not None:
+    if rows.size == 0:
         return None, []
     grid, nv = problem.grid, problem.coordinates.nv
     nodes = control_nodes(control_degree(grid.order, grid.inner_modes, 0))
@@ -78,6 +79,24 @@ def joined(
         rates = np.append(np.zeros(len(instants)), more[0].time_gradient)[order]
         joint = dataclasses.replace(joint, time_gradient=rates)
     return Instants(k[order], s[order], weights[order]), [joint]
+
+
+def by_segment(
+    problem: TrajectoryProblem, instants: Instants | None, terms: list[PointTerms]
+) -> list[PointTerms]:
+    """Forces at instants as one batch, as those of each segment of a motion."""
+    segments = problem.ld.segments
+    if instants is None or segments is None:
+        return terms
+    of = segments[instants.intervals]
+    return [_chosen(terms[0], of == each) for each in np.unique(of)]
+
+
+def _chosen(terms: PointTerms, here: Mask) -> PointTerms:
+    """The terms at some of the points."""
+    given = {each.name: getattr(terms, each.name) for each in dataclasses.fields(terms)}
+    known = {name: x[here] for name, x in given.items() if x is not None}
+    return PointTerms(**known)
 
 
 def _at_nodes(rows: LimitRows) -> list[RowsAtNodes]:

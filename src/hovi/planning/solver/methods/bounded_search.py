@@ -44,7 +44,7 @@ from hovi.planning.solver.central_path import CentralPath
 from hovi.planning.solver.clearance_outputs import EXTRA_CLEARANCE, ClearanceOutputs
 from hovi.planning.solver.condition_outputs import ConditionOutputs
 from hovi.planning.solver.limits.limit_rows import LimitRows
-from hovi.planning.solver.limits.row_forces import forces_of, joined
+from hovi.planning.solver.limits.row_forces import by_segment, forces_of, joined
 from hovi.planning.solver.methods.method import Guess, Report
 from hovi.planning.solver.multipliers import Multipliers
 from hovi.planning.solver.near.clearance_rows import ClearanceRows
@@ -337,9 +337,10 @@ class BoundedSearch:
         limits = len(multipliers) - (0 if self.near is None else self.near.size)
         rows = multipliers[limits - self.rows.size : limits]
         instants, further = forces_of(self.problem, self.rows, rows)
-        if self.near is not None and self.near.size > 0 and self.problem.ld.segments is None:
+        if self.near is not None and self.near.size > 0:
             others, more = self.near.forces(ended.x, multipliers[limits:])
             instants, further = joined(instants, further, others, more)
+        further = by_segment(self.problem, instants, further)
         return instants, self._forces_at_points(ended) + further
 
     def _forces_at_points(self, ended: Bounded) -> list[PointTerms]:

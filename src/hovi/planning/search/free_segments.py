@@ -1,0 +1,121 @@
+"""The best durations of the segments of a sequence, one after the other until none changes.
+
+With a motion at its minimum for given durations, the cost J + w T changes with the duration of each
+segment by minus its Hamiltonian plus w. So each duration is searched for as that of a single motion
+is, with the others as they are; where the motion rests between segments, they do not depend on each
+other.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Sequence
+from typing import Self
+
+import numpy as np
+
+from hovi.planning.problem.clock import Clock
+from hovi.planning.search.free_duration import MAX_STRIDE, BestDuration, FreeDuration
+from hovi.planning.search.job import Job
+from hovi.planning.search.joint_duration import (
+    NEXT_STRIDE,
+    OnGrid,
+    best_on_its_grid,
+    is_best,
+    unless_best,
+)
+from hovi.planning.solver.solver import Solution
+from hovi.system.dataclass import dataclass
+
+MAX_SWEEPS = 10
+"""Maximum number of searches for the duration of every segment."""
+
+SolverOf = Callable[[Job, Clock], OnGrid]
+"""Returns a solver of a job on a grid, whose free part has each length."""
+
+
+@dataclass(frozen=True)
+class FreeSegments:
+    """Free durations of segments.
+
+    bounds: of the duration of each segment, in [s], equal for a given one. weight: w of time.
+    """
+
+    bounds: tuple[tuple[float, float], ...]
+    weight: float = 0.0
+
+    @classmethod
+    def of(cls, durations: Sequence[float | tuple[float, float]], weight: float) -> Self:
+        """Those of segments with these durations, in [s], or bounds of them."""
+        return cls(tuple(T if isinstance(T, tuple) else (T, T) for T in durations), weight)
+
+    @property
+    def first(self) -> list[list[float]]:
+        """First durations of the segments, in [s]: geometric means, and then the longest ones.
+
+        Limits bind at short durations.
+        """
+        means = [float(np.sqrt(lower * upper)) for lower, upper in self.bounds]
+        longest = [upper for _, upper in self.bounds]
+        return [means, longest] if self.any else [longest]
+
+    @property
+    def any(self) -> bool:
+        """Whether any duration is free."""
+        return any(lower < upper for lower, upper in self.bounds)
+
+    def part(self, number: int, job: Job) -> FreeDuration | None:
+        """The duration of a segment, with those of a job in the others; None for a given one."""
+        lower, upper = self.bounds[number]
+        if lower == upper:
+            return None
+        begin, end = _ends(job)[number : number + 2]
+        return FreeDuration(lower, upper, self.weight, Clock(begin, job.grid.duration - end))
+
+
+def best_segments(
+    free: FreeSegments, job: Job, first: Solution, solver_of: SolverOf
+) -> tuple[Job, Solution]:
+    """The job with the best durations of its segments, and its motion.
+
+    first: the motion of the job. The motion is no success unless the duration of every segment is
+    the best one, with those of the others as they are.
+    """
+    best, steps, found = first, first.nit, dict[int, BestDuration]()
+    for _ in range(MAX_SWEEPS):
+        changed = False
+        for number in range(len(free.bounds)):
+            part, known = free.part(number, job), found.get(number)
+            if part is None or (known is not None and is_best(_again(known, part, best))):
+                continue
+            stride = MAX_STRIDE if known is None else NEXT_STRIDE
+            reached = best_on_its_grid(part, solver_of(job, part.clock), best, stride)
+            changed, found[number] = True, reached
+            steps, best = steps + reached.steps - best.nit, reached.solution
+            job = job.lasting(part.clock, part.length(best), best.trajectory.grid)
+            if not best.success:
+                return job, dataclasses.replace(reached.with_time(), nit=steps)
+        if not changed:
+            break
+    for number, known in found.items():
+        part = free.part(number, job)
+        assert part is not None
+        if not is_best(again := _again(known, part, best)):
+            best = unless_best(again).with_time()
+    return job, dataclasses.replace(best, nit=steps)
+
+
+def _again(found: BestDuration, part: FreeDuration, motion: Solution) -> BestDuration:
+    """What was found for a segment, with another motion."""
+    return dataclasses.replace(found, free=part, solution=motion)
+
+
+def _ends(job: Job) -> list[float]:
+    """The times at which the segments begin and end, in [s]."""
+    return [0.0, *job.ends, job.grid.duration]
+
+
+def lengths_in_words(job: Job) -> str:
+    """How long the segments of a job last, as a sentence."""
+    lengths = [f"{T:.10g}" for T in np.diff(_ends(job))]
+    return f"The segments last {', '.join(lengths[:-1])} and {lengths[-1]} s."
