@@ -32,6 +32,17 @@ def test_every_pair_gives_a_right_motion_or_is_known_to_be_refused(feature: str)
     assert refused == {each for each in REFUSED if each[0] == feature}
 
 
+@pytest.mark.long
+@pytest.mark.parametrize("call", ["replan", "advance"])
+@pytest.mark.parametrize("feature", FEATURES[:-1])
+def test_every_pair_goes_on_and_is_planned_again(feature: str, call: str) -> None:
+    """Triples with a call, but for those with a pair that is refused."""
+    triples = [pair for pair in PAIRS if pair[0] == feature and call not in pair]
+    found = {pair: outcome((*pair, call)) for pair in triples if pair not in REFUSED}
+    wrong = [f"{pair}: {reason or fault}" for pair, (reason, fault) in found.items()]
+    assert not [each for each in wrong if not each.endswith(": ")], "\n".join(wrong)
+
+
 def test_there_are_22_features() -> None:
     assert len(FEATURES) == 22
     assert len(PAIRS) == 231
