@@ -17,6 +17,7 @@ from hovi.planning.problem.conserved_momentum import (
     free_fall_contradiction,
     without_redundancy,
 )
+from hovi.planning.problem.seams import Seam
 
 
 @cache
@@ -260,3 +261,25 @@ def test_a_seam_at_which_the_center_of_mass_would_have_moved_is_refused() -> Non
     found = in_segments(State(q), State(arm_at([0.2, 0.9, -0.5]), **BASE), 0.0)
     assert found.status is hovi.Status.INFEASIBLE
     assert "joint torques cannot move the center of mass" in found.message
+
+
+@pytest.mark.parametrize("moving", [False, True])
+def test_a_replan_from_a_moving_base_leaves_unknown_what_its_momenta_no_longer_imply(
+    moving: bool,
+) -> None:
+    """A start whose base is placed freely says the momenta at rest, and none with a velocity."""
+    task = spacecraft()
+    stop = State(arm_at([0.5, -0.4, 0.3]), free=["root_joint"])
+    scheme = hovi.schemes.galerkin(2)
+    part = hovi.DiscreteLagrangian(
+        task.scene.effort_lagrangian(), hovi.Grid.uniform(0.8, 4, scheme)
+    )
+    q, goal = arm_at([0.0, 0.0, 0.0]), State(arm_at([0.2, 0.9, -0.5]), **BASE)
+    rest, moved = (State(q, v * np.ones(9), free=["root_joint"]) for v in (0.0, 0.1))
+    first, then = (rest, moved) if moving else (moved, rest)
+    known = hovi.TrajectoryProblem.of_segments([part, part], first, goal, via=(Seam(0.8, stop),))
+    assert known.structure.layout.size > 0
+    problem = known.between(then, goal)
+    fresh = hovi.TrajectoryProblem.of_segments([part, part], then, goal, via=(Seam(0.8, stop),))
+    np.testing.assert_array_equal(problem.holds[0].fixed[1], [moving] * 6 + [True] * 3)
+    assert problem.structure.layout.size == fresh.structure.layout.size

@@ -257,7 +257,9 @@ class TrajectoryProblem(ProblemSummary):
             problem._set_conditions(start, goal)
         else:
             problem = dataclasses.replace(self, start=start, goal=goal)
-        if problem.periodic == self.periodic and np.array_equal(problem.free_ends, self.free_ends):
+        masks = [(x.free_ends, *(hold.fixed for hold in x.holds)) for x in (problem, self)]
+        same = all(map(np.array_equal, *masks))
+        if problem.periodic == self.periodic and same:
             object.__setattr__(problem, "structure", self.structure)
         return problem
 
