@@ -41,6 +41,8 @@ SIZE_TEST_LENGTH = 1e-4
 """Step length, relative to the first radius, up to which the relative size is evaluated."""
 LAST_DECREASE = 1e-14
 """Relative predicted decrease below which an exact Newton step is the last in any case."""
+SINGULAR = 1e-13
+"""Negative curvature, relative to the largest, that is one of rounding errors."""
 STALLED_STEPS = 5
 """Number of steps that Criteria.stalled compares."""
 
@@ -306,7 +308,12 @@ class _ShiftSearch:
         return self.indefinite and (shift - self.low) <= 0.2 * shift
 
     def complete(self, factor: Factor, trial: Trial) -> Trial:
-        """A short step extended to the radius along the lowest eigenvector of H relative to D."""
+        """A short step extended to the radius along the lowest eigenvector of H relative to D.
+
+        Where H is singular to rounding errors, such as along a symmetry, it is a Newton step.
+        """
+        if trial.shift <= SINGULAR * self._scale():
+            return trial._replace(shift=0.0)
         u = self.model.random_vector(seed=0)
         for _ in range(4):
             u = factor.solve(self.model.metric_product(u))

@@ -20,6 +20,7 @@ from hovi.planning.problem.limits import as_limits
 from hovi.scene.casadi_lagrangian import CasadiLagrangian
 from hovi.scene.lagrangian import Lagrangian
 from hovi.schemes import galerkin
+from samples.asked_motions import USUAL, Asked, planned
 
 Array = npt.NDArray[np.float64]
 
@@ -325,3 +326,12 @@ def test_what_a_periodic_motion_does_not_have_is_refused() -> None:
     assert turns.space is not None
     with pytest.raises(InputError, match="periodic motions need joints with nq = nv"):
         problem_of(turns, Periodic(), State(turns.scene.robot.neutral()))
+
+
+@pytest.mark.filterwarnings("ignore::hovi.errors.HoviWarning")
+def test_a_symmetry_takes_no_steps() -> None:
+    """Without gravity a period may begin at any angle of the first joint: H is singular."""
+    free = {"effect": "rates", "limits": "none", "goal": "periodic"}
+    found = planned(Asked(USUAL | free))
+    assert found.success, found.message
+    assert found.nit < 50
