@@ -11,7 +11,6 @@ from typing import Any, ParamSpec, Protocol, cast
 import numpy as np
 
 from hovi.checks.arguments import check_arguments_except
-from hovi.checks.kinds import shown
 from hovi.discrete.output.caution import COLLISION, LEFT_OUT, STATUS, WARNED, Caution
 from hovi.discrete.state import State, warn_of_degrees
 from hovi.discrete.trajectory import Trajectory
@@ -28,13 +27,13 @@ from hovi.planning.problem.notation.smoothing import smoothed
 from hovi.planning.problem.presolve.assumptions import assumptions
 from hovi.planning.problem.presolve.findings import findings
 from hovi.planning.problem.presolve.length_slips import grasped_slips
-from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.problem.units import Duration, as_duration
 from hovi.planning.refinement.faults.cautions import keeping_warnings, with_cautions_of_motion
 from hovi.planning.refinement.resolution import with_check
 from hovi.planning.search.branch_choice import Ends, chosen_ends, nearest_ends
 from hovi.planning.search.free_duration import FreeDuration
 from hovi.planning.search.group import in_group, with_others
+from hovi.planning.search.guess_cautions import cautions_of_guess
 from hovi.planning.search.job import Job, grid_of, split_for_charts, stops_of
 from hovi.planning.search.least_duration import least_duration
 from hovi.planning.search.option_fields import spell_out
@@ -215,7 +214,7 @@ def _notes(found: Solution, scenes: Sequence[Scene], options: PlanOptions) -> It
         if all(each in others for others in of_scenes):
             yield Caution(LEFT_OUT, each)
     if isinstance(options.guess, Trajectory) and problem is not None:
-        yield from _of_guess(options.guess, problem)
+        yield from cautions_of_guess(options.guess, problem, found.trajectory)
     looked_for = not options.self_collision and found.status not in UNSEEN
     if looked_for and (entered := self_collision_sentence(found.trajectory)):
         yield Caution(COLLISION, entered)
@@ -229,28 +228,6 @@ def _notes(found: Solution, scenes: Sequence[Scene], options: PlanOptions) -> It
             LEFT_OUT,
             f"{link!r} and {other!r} are {gap:.2g} m nearer than the margin at an end, and may be "
             "so all along.",
-        )
-
-
-def _of_guess(guess: Trajectory, problem: TrajectoryProblem) -> Iterator[Caution]:
-    """The conditions and limits by name of a guess that the problem has none of.
-
-    Those of a saved motion are not trusted.
-    """
-    limits, asked = guess.metadata.get("limits"), guess.metadata.get("conditions")
-    named = limits.get("conditions") if isinstance(limits, Mapping) else None
-    known = {each.name for each in (*problem.conditions, *problem.bounds)}
-    missing = [
-        each
-        for names in (asked, named)
-        for each in (names if isinstance(names, list | Mapping) else ())
-        if isinstance(each, str) and each not in known
-    ]
-    if missing:
-        yield Caution(
-            LEFT_OUT,
-            f"The guess was planned with {', '.join(map(shown, missing[:5]))}, which this plan "
-            "leaves out: give the conditions and limits again.",
         )
 
 
