@@ -96,7 +96,7 @@ class ActionObjective(Objective[DiscretePath]):
         self._last: tuple[DiscretePath, list[Jet]] | None = None
         self._outputs: tuple[DiscretePath, list[Array]] | None = None
 
-    @property
+    @cached_property
     def negligible(self) -> float:
         """See Objective.negligible."""
         return self.problem.negligible_cost

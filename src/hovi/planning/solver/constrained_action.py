@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -59,7 +60,7 @@ class ConstrainedAction(EqualityObjective[DiscretePath]):
         largest = float(np.max(np.abs(expansion.hessian)))
         return max(INITIAL_NODE_PENALTY * cost, largest, 1e-6)
 
-    @property
+    @cached_property
     def negligible(self) -> float:
         """See EqualityObjective.negligible."""
         return self.problem.negligible_cost
