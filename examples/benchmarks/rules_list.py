@@ -1144,14 +1144,14 @@ _rule(
     "finer tolerances where unresolved",
     "A motion that its tolerance did not resolve is refined to finer ones.",
     "Search._at_finer_tolerances",
-    "given is None or self.free is not None or refused.status is not Status.UNRESOLVED",
+    "given is None or self._free or refused.status is not Status.UNRESOLVED",
     "True",
 )
 _rule(
     "grids that see narrow features",
     "Nodes are put where effects have narrow features.",
     "Search._seeing_features",
-    "tolerance is None or self.free is not None or NARROW not in refused.message",
+    "tolerance is None or self._free or NARROW not in refused.message",
     "True",
 )
 _rule(
