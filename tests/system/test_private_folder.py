@@ -8,6 +8,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -77,41 +78,46 @@ def test_no_folder_on_the_way_may_belong_to_somebody_else(above: Path) -> None:
 
 
 @pytest.fixture
-def as_another_user() -> Iterator[Path]:
-    """A folder of root in which another user works, whose identity this thread takes."""
+def of_root() -> Iterator[Path]:
+    """A folder of root with one of another user in it, "home"."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         folder.chmod(0o755)
         (folder / "home").mkdir()
         os.chown(folder / "home", 12345, 12345)
-        os.seteuid(12345)
-        try:
-            yield folder
-        finally:
-            os.seteuid(0)
+        yield folder
+
+
+@contextmanager
+def as_another_user() -> Iterator[None]:
+    """This thread takes the identity of the other user."""
+    os.seteuid(12345)
+    try:
+        yield
+    finally:
+        os.seteuid(0)
 
 
 @needs_root
-def test_folders_above_may_be_the_administrators(as_another_user: Path) -> None:
-    made = private_folder(as_another_user / "home", ("c",))
+def test_folders_above_may_be_the_administrators(of_root: Path) -> None:
+    with as_another_user():
+        made = private_folder(of_root / "home", ("c",))
     assert made.stat().st_uid == 12345
 
 
 @needs_root
-def test_own_folders_may_not_be_the_administrators(as_another_user: Path) -> None:
-    os.seteuid(0)
-    os.chown(as_another_user / "home", 0, 0)
-    os.seteuid(12345)
-    with pytest.raises(UnsafeFolderError, match="home belongs to another user"):
-        private_folder(as_another_user, ("home",))
+def test_own_folders_may_not_be_the_administrators(of_root: Path) -> None:
+    os.chown(of_root / "home", 0, 0)
+    refused = pytest.raises(UnsafeFolderError, match="home belongs to another user")
+    with as_another_user(), refused:
+        private_folder(of_root, ("home",))
 
 
 @needs_root
-def test_a_folder_that_may_be_entered_but_not_read_is_no_obstacle(as_another_user: Path) -> None:
-    os.seteuid(0)
-    as_another_user.chmod(0o711)
-    os.seteuid(12345)
-    assert private_folder(as_another_user / "home", ("c",)).exists()
+def test_a_folder_that_may_be_entered_but_not_read_is_no_obstacle(of_root: Path) -> None:
+    of_root.chmod(0o711)
+    with as_another_user():
+        assert private_folder(of_root / "home", ("c",)).exists()
 
 
 CHROOT = """
