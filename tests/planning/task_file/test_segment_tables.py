@@ -92,7 +92,7 @@ def test_a_saved_sequence_is_read_back(tmp_path: Path) -> None:
         ("mass = 0.5", "mass = -0.5", "line 17: effect 'payload': mass must be finite"),
         ("[segments.effects.payload]", "[segments.effects.paylod]", "line 17: there is no effect"),
         ('"600 ms"', '"6 parsecs"', "line 7: the duration of a segment '6 parsecs' has the unit"),
-        ('"600 ms"', "-1.0", "line 7: the duration of a segment must be positive"),
+        ('"600 ms"', "-1.0", "line 7: `segments[0].duration` must be a positive number"),
         ("v = 20.0", "v = -20.0", "line 8: limits.v of 'shoulder' must be a positive number"),
         ("v = 20.0", "speed = 1.0", "line 8: unknown key `segments[0].limits.speed`"),
         ('{ base = "none", v = 20.0 }', '"pandda"', 'line 8: `segments[0].limits` must be "urdf"'),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterator, Sequence
 from functools import partial
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
@@ -23,9 +23,7 @@ from hovi.planning.refinement.inactive_limits import (
     without_limits,
 )
 from hovi.planning.search.free_duration import FreeDuration, SolveFor
-from hovi.planning.search.free_segments import FreeSegments, best_segments, lengths_in_words
 from hovi.planning.search.job import Job, split_for_charts
-from hovi.planning.search.joint_duration import OnGrid
 from hovi.planning.search.multistart import Pool, default_processes, distinct
 from hovi.planning.solver.initial_path import guess_path
 from hovi.planning.solver.solver import Solution, solve_on_grid
@@ -35,6 +33,10 @@ from hovi.system.dataclass import dataclass
 from hovi.system.deadline import Deadline
 from hovi.system.interruption import interrupted
 from hovi.system.progress import Progress
+
+if TYPE_CHECKING:
+    from hovi.planning.search.free_segments import FreeSegments
+    from hovi.planning.search.joint_duration import OnGrid
 
 NAMED_GUESSES = ("cubic", "minimum-jerk")
 MAX_CHART_ROUNDS = 4
@@ -124,6 +126,9 @@ class FinalStages:
 
     def with_best_segments(self, free: FreeSegments, found: Solution) -> Solution:
         """A minimum with the best durations of its segments, to the tolerance if there is one."""
+        # Here, as for `_with_best_duration`: most plans start without these modules.
+        from hovi.planning.search.free_segments import best_segments, lengths_in_words
+
         job, steps, tolerance = self.fine, 0, self.fine.tolerance
         best = dataclasses.replace(found, problem=on_grid_of(job.problem(), found))
         for _ in range(MAX_GRIDS):

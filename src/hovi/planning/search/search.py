@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -31,7 +32,6 @@ from hovi.planning.search.final_stages import (
     with_tolerance,
 )
 from hovi.planning.search.free_duration import FreeDuration
-from hovi.planning.search.free_segments import FreeSegments
 from hovi.planning.search.job import Job, split_for_charts
 from hovi.planning.search.multistart import Exploration, Pool, default_processes, explore
 from hovi.planning.solver.initial_path import guess_path
@@ -41,6 +41,9 @@ from hovi.system.dataclass import dataclass
 from hovi.system.deadline import Deadline, OutOfTimeError
 from hovi.system.interruption import interrupted, raise_if_interrupted, record_interrupt
 from hovi.system.progress import Progress
+
+if TYPE_CHECKING:
+    from hovi.planning.search.free_segments import FreeSegments
 
 COARSE_INTERVALS = 80
 """Number of intervals of the coarse grid, used first for grids with more than twice as many."""

@@ -22,7 +22,7 @@ from hovi.errors import InputError
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.limits import Limits
 from hovi.planning.problem.notation.ends import End, as_end
-from hovi.planning.problem.units import SECONDS_IN_WORDS, Duration, as_duration, seconds
+from hovi.planning.problem.units import DURATION_IN_WORDS, Duration, as_duration, seconds
 from hovi.planning.search.job import stops_of
 from hovi.planning.search.options import PlanOptions
 from hovi.robot.robot import Robot
@@ -101,10 +101,10 @@ def as_segment(given: Table, number: int) -> Segment:
         return given
     keys = [each.name for each in fields(Segment)]
     name = f"segments[{number}]"
-    entries = entries_of(given, name, keys, {"duration": SECONDS_IN_WORDS})
+    entries = entries_of(given, name, keys, {"duration": DURATION_IN_WORDS})
     T = entries["duration"]
     if is_number(T) and not (math.isfinite(T) and T > 0):
-        raise InputError(f"`{name}.duration` must be {SECONDS_IN_WORDS}, but it is {shown(T)}.")
+        raise InputError(f"`{name}.duration` must be {DURATION_IN_WORDS}, but it is {shown(T)}.")
     if "effects" in entries:
         entries["effects"] = as_effects(entries["effects"], f"{name}.effects")
     return Segment(entries.pop("goal", None), entries.pop("duration"), **entries)

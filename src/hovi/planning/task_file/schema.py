@@ -90,10 +90,12 @@ PositiveSeconds = Annotated[
     Annotated[FiniteFloat, Field(gt=0), Tag("<number>")] | NumberAndUnit,
     Discriminator(_kind_or_text),
 ]
+Bounds = Annotated[list[Seconds], Field(min_length=2, max_length=2), Tag("<list>")]
 Duration = Annotated[
-    Annotated[float, Tag("<number>")]
-    | NumberAndUnit
-    | Annotated[list[Seconds], Field(min_length=2, max_length=2), Tag("<list>")],
+    Annotated[float, Tag("<number>")] | NumberAndUnit | Bounds, Discriminator(_kind_or_text)
+]
+PositiveDuration = Annotated[
+    Annotated[FiniteFloat, Field(gt=0), Tag("<number>")] | NumberAndUnit | Bounds,
     Discriminator(_kind_or_text),
 ]
 
@@ -200,7 +202,7 @@ class SegmentTable(Table):
     """[[segments]]: the segments of a sequence."""
 
     name: str = Field(default="", description="a text")
-    duration: Duration = Field(description=DURATION_IN_WORDS)
+    duration: PositiveDuration = Field(description=DURATION_IN_WORDS)
     goal: Goal = Field(default=None, description=_END.format("[segments.goal]"))
     limits: Any = Field(
         default=None, description='"urdf", "soft", "none", the name of an arm or a table of limits'

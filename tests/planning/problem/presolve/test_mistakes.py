@@ -209,11 +209,11 @@ WRONG: dict[str, tuple[dict[str, Any], tuple[str, ...]]] = {
     ),
     "a segment without a duration": (
         PICK | {"segments": [REACH, {"goal": {"q": [0.0, 0.0]}}]},
-        ("`segments[1].duration` is missing; it must be a positive number of seconds, or a text",),
+        ("`segments[1].duration` is missing; it must be a positive number of seconds, a text",),
     ),
     "a negative duration of a segment": (
         PICK | {"segments": [REACH | {"duration": -1.0}, BACK]},
-        ("`segments[0].duration` must be a positive number of seconds, or a text", "it is -1.0"),
+        ("`segments[0].duration` must be a positive number of seconds, a text", "it is -1.0"),
     ),
     "a goal of a segment that names a frame twice": (
         PICK | {"segments": [REACH, BACK | {"goal": {"position": [0.1, 0.2, 0.3]}}]},
