@@ -91,3 +91,18 @@ def test_a_gate_that_opens_is_waited_for() -> None:
     costs = [x.cost + 100.0 * x.trajectory.duration if x.success else np.inf for x in around]
     assert min(costs) > found.cost * (1 - 1e-6)
     assert np.isfinite(costs[2:]).all()
+
+
+def test_bounds_that_come_too_late_for_short_motions_refuse_none() -> None:
+    """The goal is outside its bound after 0.67 s, and within it before."""
+    late = hovi.Between(upper=lambda t: 1.2 - 0.3 * t)
+    bound = hovi.Condition(lambda q: q[0], late, name="closing", scale=1.0)
+    scene = hovi.Scene(hovi.load_robot(hovi.example("two_link.urdf")), [GRAVITY])
+    given = {"conditions": [bound], "limits": "none", "time_weight": 5.0, "self_collision": False}
+    for upper in (0.66, 5.0):
+        found = hovi.plan(scene, [0.0, 0.0], [1.0, 0.3], (0.2, upper), **given)
+        assert found.success, found.message
+        assert found.trajectory.duration < 2 / 3
+    late_only = hovi.plan(scene, [0.0, 0.0], [1.0, 0.3], (0.8, 5.0), **given)
+    assert late_only.status == "infeasible"
+    assert late_only.nit == 0

@@ -168,11 +168,12 @@ def _planned(
         job.lasting(free.clock, free.lower)  # raises for steps that are too short or too long
         longest = job.lasting(free.clock, free.upper).problem()
     known = findings(longest, *given)
-    warn_of_ends(scene.robot, job.start, job.goal, chosen, known.reason)
+    reason = known.reason if _says_the_same(job, free, known.reason) else ""
+    warn_of_ends(scene.robot, job.start, job.goal, chosen, reason)
     for sentence in known.warnings:
         warn(sentence)
-    fault = "" if known.reason else job.fault_of_time
-    nothing = without_search(problem, longest, chosen.guess, known.reason, fault)
+    fault = "" if reason else job.fault_of_time
+    nothing = without_search(problem, longest, chosen.guess, reason, fault)
     if nothing is not None:
         seconds = time.perf_counter() - began
         return with_notes(nothing, [job.scene], job.options, apart, seconds)
@@ -180,6 +181,14 @@ def _planned(
     reason = "" if search.ends is None else search.ends.reason
     found = infeasible_at_once(longest, chosen.guess, reason) if reason else run(search, began)
     return with_notes(found, [search.fine.scene], search.fine.options, apart)
+
+
+def _says_the_same(job: Job, free: FreeDuration | None, reason: str) -> bool:
+    """Whether shorter durations have no motion either: bounds and obstacles may come in time."""
+    if free is None or not reason:
+        return True
+    shorter = job.problem(), job.lasting(free.clock, free.lower).problem()
+    return all(findings(each, job.start, job.goal).reason for each in shorter)
 
 
 def with_notes(
