@@ -208,6 +208,12 @@ class Accuracy:
     along: float = np.nan
     timed: bool = False
 
+    @property
+    def grows(self) -> bool:
+        """Whether the error is no smaller on the last known grid than on the first."""
+        errors = [each.error for each in self.rounds if np.isfinite(each.error)]
+        return len(errors) > 1 and errors[-1] >= errors[0]
+
     @cached_property
     def estimate(self) -> MotionError | None:
         """The estimated errors of all quantities, computed on first use; None if unknown."""

@@ -239,9 +239,9 @@ class Search:
         refused: the solution as unresolved, which is returned if no tolerance helps.
         """
         given = self.fine.tolerance
-        known = solution.accuracy
-        satisfied = known is not None and known.reached
-        if given is None or self._free or not satisfied or refused.status is not Status.UNRESOLVED:
+        if given is None or self._free or refused.status is not Status.UNRESOLVED:
+            return refused
+        if solution.accuracy is not None and solution.accuracy.grows:
             return refused
         stages = FinalStages(self.fine, self.deadline, self.progress)
         for finer in given.finer:
