@@ -46,8 +46,6 @@ MAX_REFINED = 6
 MAX_FEATURE_ROUNDS, MAX_FEATURE_INTERVALS = 6, 600
 """Maximum number of grids with nodes where a minimum has narrow features, and of their intervals.
 """
-MAX_GRIDS = 4
-"""Maximum number of grids on which the best durations of segments are searched for."""
 LEAST_STEPS = 2
 """Number of steps on the requested grid without time for which it is not tried."""
 _Each = TypeVar("_Each")
@@ -128,6 +126,7 @@ class FinalStages:
         """A minimum with the best durations of its segments, to the tolerance if there is one."""
         # Here, as for `_with_best_duration`: most plans start without these modules.
         from hovi.planning.search.free_segments import best_segments, lengths_in_words
+        from hovi.planning.search.free_to_tolerance import MAX_GRIDS
 
         job, steps, tolerance = self.fine, 0, self.fine.tolerance
         best = dataclasses.replace(found, problem=on_grid_of(job.problem(), found))
