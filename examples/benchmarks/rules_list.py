@@ -563,7 +563,7 @@ _rule(
     "solve nearby",
     "A guess that is the motion of a similar problem begins with a small barrier.",
     "feasible_motion",
-    "_solved_nearby(search, path)",
+    "_solved_nearby(search)",
     "None",
     False,
 )
@@ -737,22 +737,6 @@ _rule(
     "self.near.thinned(x, 1e9)",
 )
 _at("distances", "planning.solver.methods.feasibility")
-_rule(
-    "among obstacles",
-    "At the points, a guess free of obstacles is taken as near a solution.",
-    "feasible_motion",
-    "_solved_among_obstacles(search, path, search.clearance)",
-    "None",
-    False,
-)
-_rule(
-    "without obstacles first",
-    "At the points, the motion without obstacles is where this begins.",
-    "_moved_out_of_obstacles",
-    "_without_obstacles(search, path)",
-    "path",
-    False,
-)
 _at("distances", "planning.solver.near.approaches")
 _rule(
     "rows around touches",

@@ -117,7 +117,7 @@ def test_a_limit_that_is_not_reached_leaves_the_best_duration(force: float) -> N
 
 
 @pytest.mark.parametrize("force", [None, 2.0])
-@pytest.mark.parametrize("share", [0.1, 0.4, 0.7])
+@pytest.mark.parametrize("share", [0.1, 0.4, 0.7, 0.75, 0.8, 0.9])
 def test_what_ends_the_search_early_leaves_the_best_so_far(
     share: float, force: float | None, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -54,7 +54,7 @@ from hovi.planning.solver.status import Status
 from hovi.system.blas_threads import one_blas_thread
 from hovi.system.dataclass import dataclass
 from hovi.system.deadline import OutOfTimeError, is_late
-from hovi.system.interruption import interruptible
+from hovi.system.interruption import interrupted, interruptible
 
 Array = npt.NDArray[np.float64]
 
@@ -150,7 +150,7 @@ def resolved(solution: Solution) -> Solution:
     (f) no effect has features between the points that change the cost by more: see `features_of`;
     (g) it is usable: see `judged`.
     Solutions of another status are returned unchanged. If the deadline in force passes before
-    all of this is known, the status is TIME_LIMIT.
+    all of this is known, the status is TIME_LIMIT, and INTERRUPTED after Ctrl-C.
     """
     if not solution.success or solution.problem is None:
         return solution
@@ -161,7 +161,7 @@ def resolved(solution: Solution) -> Solution:
         solution, reason = _checked(solution)
     except OutOfTimeError:
         return _not_checked(solution)
-    if reason and is_late():  # perhaps only as the finer solve was ended
+    if reason and (is_late() or interrupted()):  # perhaps only as the finer solve was ended
         return _not_checked(solution)
     if reason:
         return _unresolved(solution, reason)
@@ -370,11 +370,14 @@ def _unresolved(solution: Solution, reason: str) -> Solution:
 
 
 def _not_checked(solution: Solution) -> Solution:
-    """The solution with the status TIME_LIMIT: it is not known what lies between its points."""
+    """The solution without success, at Ctrl-C or late: what lies between its points is unknown."""
     assert solution.problem is not None
+    stopped = interrupted()
+    why = "the check was interrupted" if stopped else "the time limit was reached"
     message = (
         f"the motion is a minimum on {solution.problem.grid.intervals} intervals, of cost "
-        f"{solution.cost:.10g}, but the time limit was reached before it was compared with one on "
-        "a finer grid; allow more time."
+        f"{solution.cost:.10g}, but {why} before it was compared with one on a finer grid"
     )
-    return without_success(solution, Status.TIME_LIMIT, message)
+    if stopped:
+        return without_success(solution, Status.INTERRUPTED, f"{message}.")
+    return without_success(solution, Status.TIME_LIMIT, f"{message}; allow more time.")

@@ -72,6 +72,9 @@ Array = npt.NDArray[np.float64]
 
 SOLVE_FRACTION = 0.6
 """Fraction of a time limit of `replan` and `advance` for the solve, before the checks."""
+COARSE_LEVEL = 10 * LAST_BARRIER
+"""Last barrier parameter of a motion, relative to the mean density of the cost, above which its
+replans end at the same one: Newton steps from there to a far smaller one diverge."""
 STATIONARY_DECREASE = 1e-9
 """Predicted relative decrease of a Newton step below which a motion counts as stationary."""
 
@@ -336,6 +339,8 @@ class _Again:
         options = {"time_limit": time_limit} | options
         if problem.limited or not problem.plain:
             central = self.central if problem.limited else None
+            if central is not None and central.level > COARSE_LEVEL:
+                options = {"barrier": central.level} | options
             return solve_on_grid(problem, Start(path, central, near=True), **options)
         found = solve_on_grid(problem, follow(path, problem, self.model), **options)
         return dataclasses.replace(found, nit=found.nit + 1)

@@ -10,12 +10,8 @@ from hovi.discrete.grid import DiscretePath
 from hovi.optimize.barrier import Barrier
 from hovi.optimize.ended import STOPPED, Reason
 from hovi.optimize.start import Start
-from hovi.optimize.trust_region import minimize
-from hovi.planning.clearance.clearance_violation import approach_along
-from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.augmented_lagrangian_rounds import first_multipliers
 from hovi.planning.solver.central_path import CentralPath
-from hovi.planning.solver.clearance_outputs import ClearanceOutputs
 from hovi.planning.solver.limits.restored_motion import locally_infeasible, restored_motion
 from hovi.planning.solver.methods.bounded_search import Bounded, BoundedSearch
 from hovi.planning.solver.methods.cleared_motion import cleared_motion
@@ -42,13 +38,7 @@ WARM_STEPS = 100
 
 def feasible_motion(search: BoundedSearch) -> tuple[Bounded, str]:
     """A motion from the guess within bounds at points and control points, or why there is none."""
-    path, ended = search.guess, None
-    if search.clearance is not None:
-        ended = _solved_among_obstacles(search, path, search.clearance)
-        if ended is None:
-            path = _moved_out_of_obstacles(search, path, search.clearance)
-    moved = None if path is search.guess else path
-    ended = ended or _solved_nearby(search, path) or _solved_at_all(search, moved)
+    ended = _solved_nearby(search) or _solved_at_all(search)
     if search.near is not None:
         failed = ended.why is Reason.DIVERGED and not ended.feasible
         return ended, search.worst(ended.x) if failed else ""
@@ -59,13 +49,13 @@ def feasible_motion(search: BoundedSearch) -> tuple[Bounded, str]:
     if ended.why is Reason.DIVERGED and ended.corrected:
         search.criteria = dataclasses.replace(search.criteria, plain=True)
         search.rows = search.fine_rows()
-        ended = search.solve(Start(_known(search, moved)))
+        ended = search.solve(Start(search.guess))
     if ended.feasible or ended.why is not Reason.DIVERGED:
         return ended, ""
     return restored_motion(search, ended)
 
 
-def _solved_nearby(search: BoundedSearch, path: DiscretePath) -> Bounded | None:
+def _solved_nearby(search: BoundedSearch) -> Bounded | None:
     """The solution near a guess that is taken to be near one; None if it is not, or that fails."""
     constrained = search.problem.constrained and search.near is None
     if not search.start.near or search.clearance is not None or constrained:
@@ -75,7 +65,7 @@ def _solved_nearby(search: BoundedSearch, path: DiscretePath) -> Bounded | None:
     if search.near is None:  # beyond, a solve from the guess is shorter
         most = min(WARM_STEPS, most)
     search.criteria = dataclasses.replace(whole, max_iterations=most)
-    ended = solved_from(search, path) if along is None else _solved_along(search, along)
+    ended = solved_from(search, search.guess) if along is None else _solved_along(search, along)
     search.criteria = whole
     left = whole.max_iterations - len(ended.steps)
     closer = ended.feasible and ended.why is Reason.ITERATION_LIMIT  # than a guess
@@ -87,17 +77,11 @@ def _solved_nearby(search: BoundedSearch, path: DiscretePath) -> Bounded | None:
     return None if ended.why is Reason.DIVERGED else ended
 
 
-def _known(search: BoundedSearch, moved: DiscretePath | None) -> DiscretePath:
-    """The moved guess, or else the guess for the duration that the last solve has moved to."""
-    return search.guess if moved is None else moved
-
-
-def _solved_at_all(search: BoundedSearch, moved: DiscretePath | None) -> Bounded:
-    path = _known(search, moved)
+def _solved_at_all(search: BoundedSearch) -> Bounded:
     if search.near is not None:
         search.near = search.no_near_rows()
-        return cleared_motion(search, path)
-    return search.solve(Start(path))
+        return cleared_motion(search, search.guess)
+    return search.solve(Start(search.guess))
 
 
 def _solved_along(search: BoundedSearch, along: CentralPath) -> Bounded:
@@ -194,36 +178,3 @@ def solved_from(search: BoundedSearch, path: DiscretePath) -> Bounded:
     """Solve from a motion that nearly is a solution, with a small barrier from the beginning."""
     search.look_around(path)
     return search.solve(search.start_at(path, NEARBY_MU, search.objective(search.multipliers)))
-
-
-def _solved_among_obstacles(
-    search: BoundedSearch, path: DiscretePath, wanted: ClearanceOutputs
-) -> Bounded | None:
-    """The solution near a guess free of obstacles; None if it is not free, or that fails."""
-    given = approach_along(search.problem.trajectory(path), wanted.distances, wanted.least)
-    if float(given.distance.min()) < wanted.least:
-        return None
-    ended = solved_from(search, path)
-    return ended if ended.settled else None
-
-
-def _moved_out_of_obstacles(
-    search: BoundedSearch, path: DiscretePath, wanted: ClearanceOutputs
-) -> DiscretePath:
-    """A guess: the motion of least action without obstacles, or that given if none is found."""
-    search.clearance = None
-    path = _without_obstacles(search, path)
-    search.clearance = wanted
-    return path
-
-
-def _without_obstacles(search: BoundedSearch, path: DiscretePath) -> DiscretePath:
-    if search.limits.bounded.any():
-        ended = search.solve(Start(path))
-        return ended.x if ended.feasible else path
-    if search.problem.constrained:
-        return path
-    objective, criteria = ActionObjective(search.problem), search.remaining_criteria()
-    result = minimize(objective, Start(path), criteria, search.report)
-    search.iterations += len(result.steps)
-    return result.x if np.isfinite(result.value) else path
