@@ -599,3 +599,39 @@ def _late(fraction: float, duration: float) -> Problem:
 
 _problem("way back in little time")(_late(0.019, 1.0))
 _problem("way back in less time")(_late(0.019, 0.8))
+
+
+# What tests noticed where no problem above did
+
+
+def _links_apart(name: str, start: list[float], goal: list[float], **options: Any) -> Problem:
+    """A reach without limits whose links would meet."""
+
+    def run(nudge: int) -> hovi.Solution:
+        scene = _given(name)
+        q = nudged(start, scene.robot, nudge)
+        return _plan(scene, q, np.array(goal), 1.5, limits="none", **options)
+
+    return run
+
+
+_problem("ur5 clear of its links without limits")(
+    _links_apart("ur5", [0.0, -1.2, 1.2, -0.5, 0.3, 0.1], [1.2, -0.6, 0.4, 0.7, -0.8, 1.0])
+)
+
+
+@_problem("branches that links decide")
+def _branches_by_links(nudge: int) -> hovi.Solution:
+    scene = _given("ur5")
+    start = nudged([-2.3758, -1.7605, -1.7208, -0.5681, 0.5744, 1.6046], scene.robot, nudge)
+    there = np.array([[-1.7827, 0.2879, -1.0746, 1.5469, 0.6747, -1.358]])
+    goal = hovi.FrameGoal("tool0", scene.robot.frame_pose("tool0", there[0]))
+    return _plan(scene, start, goal, 2.5)
+
+
+@_problem("replan of a plan with all defaults")
+def _replan_by_default(nudge: int) -> hovi.Solution:
+    scene = _given("ur5")
+    start, goal = np.array([0.0, -1.2, 1.4, -1.8, -1.5, 0.0]), [1.1, -0.9, 1.0, -1.2, -1.0, 0.5]
+    known = _plan(scene, nudged(start, scene.robot, nudge), np.array(goal), 1.2)
+    return known.replan(start=start + 1e-3)
