@@ -221,7 +221,7 @@ _rule(
     "radius grows fourfold",
     "Among obstacles the radius grows by four where the model predicted the decrease to 5 %.",
     "BoundedSteps.radius_after",
-    "reopens and abs(ratio - 1.0) <= ALIKE and length > 0.7 * last",
+    "alike and reopens and length > 0.7 * last",
     "False",
 )
 _rule(
@@ -230,6 +230,13 @@ _rule(
     "BoundedSteps.radius_after",
     "min(radius, max(CUT_RADIUS * length, LEAST_CUT_RADIUS))",
     "radius",
+)
+_rule(
+    "radius grows where bounds cut",
+    "It doubles at a step that bounds cut, while outputs differ from their slacks.",
+    "BoundedSteps.radius_after",
+    "alike and unmatched and not (reopens or step.trial.newton)",
+    "False",
 )
 _rule(
     "radius shortened while unmatched",

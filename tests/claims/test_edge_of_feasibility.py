@@ -166,6 +166,16 @@ def test_smooth_motions_too(way: float, most: float, tmp_path: Path) -> None:
     assert not plan(0.99 * way / most).success
 
 
+@pytest.mark.parametrize("seed", range(8))
+def test_smooth_motions_near_the_least_time_of_a_velocity(seed: int, tmp_path: Path) -> None:
+    """A convex problem, whose cost is a hundred times that of its guess."""
+    way, most = np.random.default_rng(seed).uniform([0.3, 0.4], [4.0, 2.0])
+    scene = sliders(tmp_path, 1)
+    T = (1.005, 1.01, 1.02)[seed % 3] * way / most
+    solution = hovi.plan(scene, [0.0], [way], T, limits={"v": [most]}, smooth=True)
+    assert solution.success, solution.message
+
+
 @pytest.mark.xfail(strict=True, reason="1.0021 to 1.01: a convex problem is called infeasible")
 def test_smooth_motions_with_an_acceleration_limit(tmp_path: Path) -> None:
     scene, way, V, A = sliders(tmp_path, 1), 1.3, 1.0, 4.0

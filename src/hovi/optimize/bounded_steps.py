@@ -44,6 +44,8 @@ them."""
 ALIKE, MOST_GROWTH = 0.05, 4.0
 """Relative difference of the actual and the predicted decrease up to which the radius grows by the
 second of these, if the objective reopens; others begin with a radius that is wide enough."""
+CUT_GROWTH = 2.0
+"""The same of others where bounds, which are not satisfied yet, cut a step at the radius."""
 SHORT_FRACTION = 0.1
 """Fraction of a step at the radius below which it was too long for the bounds that cut it."""
 MATCHED = 1e-4
@@ -222,11 +224,15 @@ class BoundedSteps(Generic[X]):
         norm, last = step.trial.norm, self.radius
         length = norm * step.fraction
         radius, reopens = next_radius(last, length, ratio), self.objective.reopens
-        if reopens and abs(ratio - 1.0) <= ALIKE and length > 0.7 * last:
+        alike = abs(ratio - 1.0) <= ALIKE
+        if alike and reopens and length > 0.7 * last:
             return max(radius, MOST_GROWTH * last)
+        unmatched = self.ended.violation > MATCHED
+        if alike and unmatched and not (reopens or step.trial.newton):
+            return max(radius, CUT_GROWTH * last)  # bounds cut the step, and not the model
         if step.trial.newton or step.fraction >= SHORT_FRACTION:
             return radius
-        if self.ended.violation <= MATCHED:
+        if not unmatched:
             return min(radius, max(CUT_RADIUS * length, LEAST_CUT_RADIUS))
         if not reopens:
             return radius
