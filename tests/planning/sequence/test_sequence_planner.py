@@ -326,6 +326,26 @@ def test_a_frame_is_met_within_the_limits_of_its_own_segment() -> None:
     np.testing.assert_allclose(scene().robot.frame_position("tip", reached)[0], tip, atol=1e-8)
 
 
+@pytest.mark.parametrize(("shoulder", "sign"), [(0.4, 1.0), (1.7, -1.0)])
+@pytest.mark.parametrize("narrow", range(3))
+def test_a_frame_where_segments_meet_is_met_within_the_limits_of_both(
+    narrow: int, shoulder: float, sign: float
+) -> None:
+    """The elbow bends to the better side, unless the segment before or after is limited to none."""
+    limits = {"base": "none", "q": {"elbow": sorted([-9.0 * sign, 0.2 * sign])}}
+    tip = scene().robot.frame_position("tip", np.array([GRAB]))[0]
+    goals = hovi.FrameGoal("tip", position=tip), [shoulder, 0.0], [0.4, 0.0]
+    given = [
+        Segment(goal, 0.8, limits=limits if i == narrow else None) for i, goal in enumerate(goals)
+    ]
+    found = hovi.plan_sequence(
+        scene(), [shoulder, 0.0], given, limits="none", intervals=12, self_collision=False
+    )
+    assert found.violation == ""
+    elbow = found.trajectory.configurations([0.8])[0, 1]
+    assert elbow == pytest.approx(0.9 * (sign if narrow == 2 else -sign), abs=1e-6)
+
+
 def test_smooth_sequences_have_continuous_accelerations() -> None:
     found = hovi.plan_sequence(
         scene(), [0.0, 0.0], segments(), limits="none", smooth=True, self_collision=False
