@@ -194,6 +194,31 @@ def test_a_goal_may_name_its_frame(arm_scene: hovi.Scene) -> None:
     np.testing.assert_allclose(middle, [1.8, 0.0, -0.2], atol=1e-5)
 
 
+def test_without_a_pose_it_is_at_the_origin_of_its_frame(arm_scene: hovi.Scene) -> None:
+    robot = hovi.holding(arm_scene.robot, hovi.Grasped(hovi.Sphere([0, 0, 0.1], 0.1), "tip", 2.0))
+    q = np.array([0.4, -0.9])
+    np.testing.assert_allclose(
+        robot.frame_pose("grasped", q), robot.frame_pose("tip", q), atol=1e-12
+    )
+
+
+def test_a_robot_holds_up_to_fifty_objects_of_up_to_a_million_tonnes(
+    arm_scene: hovi.Scene,
+) -> None:
+    bead = hovi.Sphere([0, 0, 0], 0.01)
+    beads = [hovi.Grasped(bead, "tip", 0.5, f"bead {i}") for i in range(51)]
+    robot = hovi.holding(arm_scene.robot, beads[:50])
+    more = sum(x.mass for x in robot.model.inertias) - sum(
+        x.mass for x in arm_scene.robot.model.inertias
+    )
+    assert more == pytest.approx(25.0)
+    with pytest.raises(InputError, match="50"):
+        hovi.holding(arm_scene.robot, beads)
+    assert hovi.Grasped(bead, "tip", 1e9).mass == 1e9
+    with pytest.raises(InputError, match="the mass of grasped object 'grasped'"):
+        hovi.Grasped(bead, "tip", 1.001e9)
+
+
 def test_names_of_what_it_may_touch_have_to_exist(panda: hovi.Robot) -> None:
     robot = hovi.holding(panda, crate())
     clearance = hovi.Clearance(

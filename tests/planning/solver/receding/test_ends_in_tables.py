@@ -11,6 +11,7 @@ import pytest
 
 import hovi
 from hovi.errors import InputError, UnreachableError
+from samples.small_robots import with_shapes
 
 Q = [0.3, -1.2, 1.2, -0.5, 0.3, 0.1]
 HAND = [0.45, 0.25, 0.35]
@@ -70,6 +71,82 @@ def test_a_start_may_be_a_pose_or_a_frame_near_the_old_start(planned: hovi.Solut
     np.testing.assert_allclose(found.trajectory.q[0], planned.trajectory.q[0], atol=1e-6)
     with pytest.raises(UnreachableError):
         planned.replan(start={"frame": "tool0", "position": [9.0, 0.0, 0.0]})
+
+
+UP, DOWN = [0.9, 0.8], [1.5312840589, -0.8]
+"""Two configurations of the two-link arm with its tip at the same place."""
+
+
+def from_frame(start: Any, goal: Any, guess: Any = None, to: Any = None, **given: Any) -> Any:
+    """Where a motion starts that is replanned from a frame at the place of UP and DOWN."""
+    robot = with_shapes("two_link.urdf")
+    options = {"limits": "none", "self_collision": False, "intervals": 8, **given}
+    found = hovi.plan(hovi.Scene(robot), start, goal, 1.0, **options)
+    assert found.success, found.message
+    at = robot.frame_position("tip", np.array(UP))
+    again = found.replan(start=hovi.FrameGoal("tip", position=at, guess=guess), goal=to)
+    assert again.success, again.message
+    return again.trajectory.q[0]
+
+
+def test_of_the_configurations_of_a_frame_the_nearest_to_the_old_start_is_taken() -> None:
+    """Not the one that is nearest to the goal or to zero; a guess is nearer than anything."""
+    old, goal = [1.4, -0.7], [0.8, 0.7]
+    np.testing.assert_allclose(from_frame(old, goal), DOWN, atol=1e-6)
+    np.testing.assert_allclose(from_frame(old, goal, guess=UP), UP, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("old", "goal", "other"), [([0.5, 1.1], [0.3, 0.7], DOWN), ([1.9, -1.1], [2.1, -0.7], UP)]
+)
+def test_of_the_configurations_of_a_frame_one_clear_of_obstacles_is_taken(
+    old: Any, goal: Any, other: Any
+) -> None:
+    robot = with_shapes("two_link.urdf")
+    nearest = DOWN if other is UP else UP
+    np.testing.assert_allclose(from_frame(old, goal), nearest, atol=1e-6)
+    ball = hovi.Sphere(robot.frame_position("elbow", np.array(nearest)), 0.1)
+    found = from_frame(old, goal, to=np.add(other, 0.1), obstacles=[ball])
+    np.testing.assert_allclose(found, other, atol=1e-6)
+
+
+@pytest.mark.parametrize(("old", "other"), [([0.9, 0.1], DOWN), ([1.5, -0.1], UP)])
+def test_of_the_configurations_of_a_frame_one_within_the_limits_is_taken(
+    old: Any, other: Any
+) -> None:
+    """In a sequence those of the first segment."""
+    bounds = sorted([0.2 * np.sign(old[1]), 3.0 * np.sign(other[1])])
+    limits = {"base": "none", "q": {"elbow": bounds}}
+    found = from_frame(old, [1.2, 0.0], limits=limits)
+    np.testing.assert_allclose(found, other, atol=1e-6)
+    scene = hovi.Scene(with_shapes("two_link.urdf"))
+    segments = [hovi.Segment([1.2, 0.0], 0.6, limits=limits), hovi.Segment([1.0, 0.0], 0.6)]
+    options = {"limits": "none", "self_collision": False, "intervals": 8}
+    motion = hovi.plan_sequence(scene, old, segments, **options)
+    start = {"frame": "tip", "position": scene.robot.frame_position("tip", np.array(UP))}
+    again = motion.replan(start=start)
+    np.testing.assert_allclose(again.trajectory.q[0], other, atol=1e-6)
+
+
+def test_a_solved_problem_without_obstacles_starts_at_a_frame() -> None:
+    scene = hovi.Scene(with_shapes("two_link.urdf"))
+    grid = hovi.Grid.uniform(1.0, 8, hovi.schemes.by_name("galerkin-2"))
+    ld = hovi.DiscreteLagrangian(scene.effort_lagrangian(), grid)
+    solved = hovi.solve(hovi.TrajectoryProblem(ld, hovi.State([0.5, 0.5]), hovi.State([1.0, 0.5])))
+    at = scene.robot.frame_position("tip", np.array(UP))
+    again = solved.replan(start={"frame": "tip", "position": at})
+    np.testing.assert_allclose(again.trajectory.q[0], UP, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("frame", "words"), [("shoulder_pan", "no frame"), ("base_link", "as no joint moves it")]
+)
+def test_a_start_at_a_frame_that_cannot_be_led_anywhere_is_refused(
+    planned: hovi.Solution, frame: str, words: str
+) -> None:
+    for start in ({"frame": frame, "position": HAND}, hovi.FrameGoal(frame, position=HAND)):
+        with pytest.raises(InputError, match=words):
+            planned.replan(start=start)
 
 
 def test_times_may_be_texts(planned: hovi.Solution) -> None:
