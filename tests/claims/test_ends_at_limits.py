@@ -214,6 +214,43 @@ def test_a_sensor_that_gives_no_number_is_refused(end: str) -> None:
             call()
 
 
+@pytest.mark.parametrize(
+    "grid",
+    [
+        {"intervals": 5},
+        {"intervals": 20},
+        {"intervals": 40},
+        {"intervals": 40, "scheme": "galerkin-0x4"},
+    ],
+)
+@pytest.mark.parametrize(
+    ("start", "goal", "limit"),
+    [
+        (hovi.State([0.0], [3.02]), hovi.State([6.4], [2.6]), "v"),
+        (hovi.State([-0.1], [-3.02]), hovi.State([-6.5], [-2.6]), "v"),
+        (hovi.State([1.5], [0.3]), hovi.State([1.4]), "q"),
+        (hovi.State([-1.5], [-0.3]), hovi.State([-1.4]), "q"),
+    ],
+)
+def test_a_motion_is_at_its_limit_from_where_it_is_led_back_on(
+    start: hovi.State, goal: hovi.State, limit: str, grid: dict[str, Any]
+) -> None:
+    """On every grid; no more is excused than the sentence says, and nothing afterwards."""
+    bound = {"q": 1.5, "v": 3.0}[limit]
+    given = {"limits": {"base": "none", limit: bound}, "self_collision": False}
+    free = hovi.Scene(scene("pendulum").robot)
+    solution = hovi.plan(free, start, goal, T, **grid, **given)
+    assert solution.usable, solution.message
+    (excused,) = solution.excused
+    t = np.linspace(0.0, T, SAMPLES)
+    over = np.abs(getattr(solution.trajectory.sample(t), limit)[:, 0]) - bound
+    e, after = excused.at(t), t >= excused.until
+    assert e.max() == pytest.approx(excused.excess, rel=1e-4)
+    assert (e[after] == 0.0).all()
+    assert (over - e).max() <= TOLERANCE
+    assert over[after & (t < 1.5 * excused.until)].max() >= -1e-6
+
+
 def test_what_is_excused_stays_with_a_saved_motion(tmp_path: Any) -> None:
     solution = from_start(3.002)
     solution.trajectory.save(tmp_path / "m.npz")
