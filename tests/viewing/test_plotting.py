@@ -5,6 +5,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+import pinocchio as pin
 import pytest
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -25,6 +26,7 @@ from hovi.viewing import plotting
 from hovi.viewing.curves.scheme_torque import scheme_torque
 from hovi.viewing.figures import align_zeros
 from samples.cubic_motion import cubic_motion
+from samples.manifold_robots import chain
 
 Picture = Callable[[Trajectory, Path], None]
 
@@ -126,6 +128,56 @@ def test_a_curve_is_marked_where_it_is_at_a_limit(motion: Trajectory) -> None:
     assert 0 < len(marked) < 1000
     assert marked.min() >= np.degrees(speed.max()) - 1e-3 * np.degrees(speed.max() + 100.0)
     assert "at a limit" in [text.get_text() for text in figure.legends[0].get_texts()]
+
+
+def marked(figure: Figure) -> list[np.ndarray]:
+    """What is marked as at a limit in each panel, in its unit."""
+    found = [[np.asarray(x.get_ydata()) for x in lines(figure, k, "at a limit")] for k in range(3)]
+    return [np.concatenate([np.zeros(0), *each]) for each in found]
+
+
+@pytest.mark.parametrize(
+    ("limits", "start", "goal", "duration"),
+    [
+        ({"q": 1.6}, hovi.State([1.0], [2.5]), 1.5, 1.2),
+        ({"v": 1.8}, hovi.State([0.2]), 1.4, 0.8),
+        ({"tau": 10.0}, hovi.State([0.2]), 1.4, 0.8),
+    ],
+    ids=["q", "v", "tau"],
+)
+def test_a_planned_motion_of_one_joint_is_marked_where_it_is_at_its_limit(
+    pendulum: Robot, limits: dict[str, float], start: hovi.State, goal: float, duration: float
+) -> None:
+    given = {"limits": {"base": "none", **limits}, "self_collision": False}
+    solution = hovi.plan(Scene(pendulum, [Gravity()]), start, [goal], duration, **given)
+    values = marked(hovi.plot(solution))
+    (kind, bound), *_ = limits.items()
+    for name, found, unit in zip(
+        ("q", "v", "tau"), values, (np.degrees(1.0),) * 2 + (1.0,), strict=True
+    ):
+        found = found[np.isfinite(found)] / unit
+        assert (len(found) > 0) is (name == kind)
+        assert (np.abs(np.abs(found) - bound) <= 2.1e-3 * bound).all()
+
+
+def test_motions_of_continuous_joints_and_without_torques_are_marked_at_limits() -> None:
+    robot = hovi.load_robot(chain([pin.JointModelRUBY(), pin.JointModelRX()]))
+    goal = pin.integrate(robot.model, robot.neutral(), np.array([1.0, 0.5]))
+    given = {"limits": {"base": "none", "v": {"j0": 1.1}}, "self_collision": False}
+    turning = hovi.plan(Scene(robot), robot.neutral(), goal, 1.0, **given)
+    bounds = np.full((4, 2), np.inf)
+    bounds[1, 0] = 1.1
+    ld = hovi.DiscreteLagrangian(
+        hovi.spline(2), hovi.Grid.uniform(1.0, 8, hovi.schemes.galerkin(2))
+    )
+    ends, limits = (hovi.State([0.0, 0.0]), hovi.State([1.0, 0.5])), hovi.Limits(-bounds, bounds)
+    without = hovi.solve(hovi.TrajectoryProblem(ld, *ends, limits))
+    for solution, unit in ((turning, np.degrees(1.0)), (without, 1.0)):
+        assert solution.success, solution.message
+        q, v, tau = (x[np.isfinite(x)] / unit for x in marked(hovi.plot(solution)))
+        assert len(v) > 0
+        assert (np.abs(v - 1.1) <= 2.3e-3).all()
+        assert len(q) == len(tau) == 0
 
 
 def test_distant_limits_do_not_change_the_axis_range(motion: Trajectory) -> None:
