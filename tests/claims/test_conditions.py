@@ -18,6 +18,7 @@ from hovi.study.running.measures import row_of
 
 START, GOAL = np.array([0, -1.5, 1.5, 0, 0, 0.0]), np.array([1.0, -1.0, 1.0, 0.5, 0.5, 0.5])
 OPTIONS: dict[str, Any] = {"self_collision": False}
+MODEL = hovi.Scene(hovi.load_robot(hovi.example("two_link.urdf")), [hovi.effects.Gravity()]).model
 
 
 def powers(motion: hovi.Trajectory, robot: hovi.Robot) -> np.ndarray:
@@ -392,6 +393,8 @@ def test_a_scene_file_limits_the_power(models: Path, tmp_path: Path) -> None:
             limited_to(bound)
 
 
+TORQUE = float(pin.rnea(MODEL, MODEL.createData(), *np.array([[1.0, 0.5], [0.3, 0.2], [0, 0]]))[0])
+"""Of the shoulder, in [N m], where a motion passes with a velocity and without an acceleration."""
 AT_ENDS: dict[str, tuple[hovi.Condition, dict[str, Any], str]] = {
     "a start": (
         hovi.Condition("q", hovi.Between(0.1, 2.0), name="c"),
@@ -418,15 +421,20 @@ AT_ENDS: dict[str, tuple[hovi.Condition, dict[str, Any], str]] = {
         {"smooth": True},
         "condition 'c' of entry 0 is 7.66406 at the start",
     ),
+    "a smooth motion's torque at its goal": (
+        hovi.Condition("tau", hovi.Between(-1.0, 1.0), name="c"),
+        {"smooth": True, "start": [np.pi / 2, 0.0], "goal": hovi.State([1.0, 0.5], [0.3, 0.2])},
+        f"condition 'c' of entry 0 is {TORQUE:.6g} at the goal",
+    ),
     "a smooth motion's acceleration": (
         hovi.Condition("a", hovi.Between(1.0, 3e3), name="c"),
-        {"smooth": True},
+        {"smooth": True, "start": hovi.State([0.0, 0.0], [0.4, 0.4])},
         "condition 'c' of entry 0 is 0 at the start",
     ),
     "a bound of the time": (
         hovi.Condition("q", hovi.Between(-9.0, lambda t: 1.2 - 0.3 * t), name="c", scale=1.0),
-        {},
-        "condition 'c' of entry 0 is 1 at the goal, outside its bounds [-9, 0.9]",
+        {"duration": 0.8},
+        "condition 'c' of entry 0 is 1 at the goal, outside its bounds [-9, 0.96]",
     ),
     "what a free joint cannot change": (
         hovi.Condition("v", hovi.Between(1.0, 3.0), name="c", of=["shoulder", "elbow"]),
@@ -457,6 +465,15 @@ def test_an_end_that_violates_a_condition_is_refused_at_once(
         ("q", {"goal": hovi.State([1.0, 0.5], free=["shoulder"])}),
         ("tau", {}),
         ("tau * v", {"start": hovi.State([0.0, 0.0], [1.0, 0.0])}),
+        ("a", {"goal": hovi.State([1.0, 0.5], [2.0, 1.0])}),
+        (
+            "tau",
+            {
+                "start": [-np.pi / 2, 0.0],
+                "goal": hovi.State([0.0, 0.0], free=["shoulder"]),
+                "smooth": True,
+            },
+        ),
     ],
 )
 def test_an_end_that_may_satisfy_a_condition_is_not_refused(
@@ -464,11 +481,32 @@ def test_an_end_that_may_satisfy_a_condition_is_not_refused(
 ) -> None:
     """What is free there does: a position, or an acceleration and with it the torque."""
     scene = hovi.Scene(two_link, [hovi.effects.Gravity()])
-    bounds = {"q": (-1.0, 0.9), "tau": (-9.0, 9.0), "tau * v": (-2.0, 3.0)}[function]
+    bounds = {"q": (-1.0, 0.9), "tau": (-7.0, 7.0), "tau * v": (-2.0, 3.0), "a": (0.5, 9.0)}[
+        function
+    ]
     asked = hovi.Condition(function, hovi.Between(*bounds), name="c")
     ends = {"start": [0.0, 0.0], "goal": [1.0, 0.5], "duration": 1.0, "limits": "none", **given}
     found = hovi.plan(scene, **ends, conditions=[asked], continuation=False, **OPTIONS)
     assert found.nit > 0
+
+
+def test_of_a_periodic_motion_the_held_position_alone_may_violate_a_condition() -> None:
+    """Its velocity at the start is a guess."""
+    scene = hovi.Scene(hovi.load_robot(hovi.example("pendulum.urdf")), [hovi.effects.Gravity()])
+    grid = hovi.Grid.uniform(1.0, 24, hovi.schemes.galerkin(2))
+    ld = hovi.DiscreteLagrangian(scene.effort_lagrangian(), grid)
+    start, turn = hovi.State([0.5], [1.0]), hovi.Periodic([2 * np.pi])
+
+    def solved(function: str, on: hovi.Between) -> hovi.Solution:
+        asked = hovi.Condition(function, on, name="c")
+        return hovi.solve(hovi.TrajectoryProblem(ld, start, turn, conditions=[asked]))
+
+    held = solved("q", hovi.Between(-9.0, 0.3))
+    assert (held.status, held.nit) == (hovi.Status.INFEASIBLE, 0)
+    assert "condition 'c' is 0.5 at the start, outside its bounds [-9, 0.3]" in held.message
+    fast = solved("v", hovi.Between(lower=5.0))
+    assert fast.success, fast.message
+    assert fast.trajectory.v.min() > 5.0 - 1e-4
 
 
 def broken(function: Any, on: Any = None, **more: Any) -> Callable[[], hovi.Condition]:

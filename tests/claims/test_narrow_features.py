@@ -292,6 +292,26 @@ def test_features_of_the_state_are_paid_for_or_said(
     assert_honest(case, planned(case))
 
 
+@pytest.mark.parametrize(("height", "weight"), [(0.1, 1.0), (-0.1, 1.0), (0.1, 1e-4)])
+def test_a_thin_wall_in_q_that_the_first_grid_misses_gets_nodes(
+    height: float, weight: float
+) -> None:
+    """Also where it costs hardly more than the tolerance, or less than nothing, in any unit."""
+    width, center = 1e-3, 0.4231
+    of_unit, weighted = (
+        cost("cost in q", shoulder, "q['shoulder']", center, width, height * unit / width)
+        for unit in (1.0, weight)
+    )
+    found = planned(weighted, weight=[weight, weight])
+    assert found.success, found.message
+    assert found.error_estimate is not None
+    assert found.error_estimate < 1e-3
+    true = weight * along(of_unit, found.trajectory)
+    assert found.cost == pytest.approx(true, rel=max(found.error_estimate, ORACLE))
+    near = np.abs(found.trajectory.q[:, 0] - center) < 9 * width
+    assert near.sum() > len(near) / 2
+
+
 def test_what_no_grid_resolves_is_said_at_once() -> None:
     fast = E.Wrench("tip", force=["0", "0", "5*sin(2*pi*10000*t)"])
     thin = E.Wrench("tip", force=["0", "0", "9e6*exp(-((t-0.3331)/1e-8)**2)"])

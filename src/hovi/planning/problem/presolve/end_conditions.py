@@ -22,7 +22,7 @@ def violated_at_end(problem: TrajectoryProblem) -> str:
 
     With all that the end leaves free anywhere: as accelerations and torques, unless they are given.
     """
-    if not problem.bounds or problem.periodic:
+    if not problem.bounds:
         return ""
     for end, name in enumerate(("start", "goal")):
         box = _box(problem, end)
