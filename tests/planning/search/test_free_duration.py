@@ -304,3 +304,29 @@ def test_each_other_duration_is_tried_from_one_start(two_link: hovi.Robot) -> No
     assert any(text.startswith("no minimum for") for text in said)
     counted = {int(number) for text in said for number in re.findall(r"of (\d+) starts", text)}
     assert counted == {3}
+
+
+@pytest.mark.parametrize("starts", [1, 2])
+def test_no_other_duration_is_tried_once_a_motion_is_found(
+    two_link: hovi.Robot, starts: int
+) -> None:
+    said: list[str] = []
+    options = {"continuation": False, "processes": 1, "starts": starts, "obstacles": [FAR_AWAY]}
+    options |= {"intervals": 8, "time_weight": 30.0}
+    found = raised(two_link, (0.3, 3.0), progress=lambda text, _: said.append(text), **options)
+    assert found.success, found.message
+    assert "starts" not in found.message
+    assert "Nor was one found" not in found.message
+    pairs = [re.findall(r"([\d.]+) s", x) for x in said if x.startswith("no minimum for")]
+    assert [last for _, last in pairs[:-1]] == [first for first, _ in pairs[1:]]
+    fixed = {"continuation": False, "intervals": 8}
+    assert not raised(two_link, float(pairs[-1][0]), **fixed).success
+    assert raised(two_link, float(pairs[-1][1]), **fixed).success
+
+
+def test_no_other_duration_is_tried_after_the_time_limit(two_link: hovi.Robot) -> None:
+    said: list[str] = []
+    options = {"time_weight": 30.0, "time_limit": 1e-6, "processes": 1}
+    found = raised(two_link, (0.3, 3.0), progress=lambda text, _: said.append(text), **options)
+    assert found.status is hovi.Status.TIME_LIMIT
+    assert not any(text.startswith("no minimum for") for text in said)
