@@ -1,4 +1,4 @@
-"""Tolerances of equations: of passive torques and conditions at nodes; and which are not met."""
+"""Tolerances of equations: of passive torques and conditions at nodes; and which are violated."""
 
 from __future__ import annotations
 
