@@ -185,6 +185,20 @@ class Job:
         """The grid with nodes where formulas of time change, unless the options name the grid."""
         return grid if self.tolerance is None else self._graded(grid)[0]
 
+    def with_nodes_where_led_back(self) -> Self:
+        """The job with nodes at the times until which its start is led back inside its limits.
+
+        Bounds have a kink there, which no estimate sees inside an interval. The same job where the
+        options name the grid.
+        """
+        limits, T = self.problem().limits, self.grid.duration
+        if self.tolerance is None or limits is None or not limits.excused:
+            return self
+        known = self.node_times
+        times = {each.until for each in limits.excused if 0.0 < each.until < T}
+        new = [t for t in times if all(abs(t - other) > 1e-9 * T for other in (*known, T))]
+        return self.on(self.graded(self.grid.with_nodes(sorted([*known, *new]), halved=True)))
+
     @property
     def fault_of_time(self) -> str:
         """What no grid of its options resolves of the formulas of time, a clause; "" if nothing."""

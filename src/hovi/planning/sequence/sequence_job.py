@@ -72,7 +72,7 @@ def job_of(
     job = job.with_options(via=(*seams, *options.via))
     if stops_of(options):
         job = job.on(grid.with_nodes(job.node_times, options.intervals is None))
-    return job.on(job.graded(job.grid))
+    return job.on(job.graded(job.grid)).with_nodes_where_led_back()
 
 
 def limits_of(
