@@ -40,6 +40,8 @@ MAX_GUESS_INTERVALS = 400
 """Largest number of intervals of a guess on whose grid a refinement begins."""
 MAX_CHART_INTERVALS = 2000
 """Maximum number of intervals after halving for the orientations of the initial guess."""
+CLOSE_NODES = 1e-3
+"""Distance of times, as a fraction of the duration, up to which one node is for both."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -194,10 +196,11 @@ class Job:
         limits, T = self.problem().limits, self.grid.duration
         if self.tolerance is None or limits is None or not limits.excused:
             return self
-        known = self.node_times
-        times = {each.until for each in limits.excused if 0.0 < each.until < T}
-        new = [t for t in times if all(abs(t - other) > 1e-9 * T for other in (*known, T))]
-        return self.on(self.graded(self.grid.with_nodes(sorted([*known, *new]), halved=True)))
+        times = self.node_times
+        for time in sorted(each.until for each in limits.excused):
+            if all(abs(time - other) > CLOSE_NODES * T for other in (0.0, *times, T)):
+                times.append(time)
+        return self.on(self.graded(self.grid.with_nodes(sorted(times), halved=True)))
 
     @property
     def fault_of_time(self) -> str:
