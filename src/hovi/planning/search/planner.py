@@ -329,7 +329,7 @@ class _Planning:
         with deadline.in_force():
             scene.effort_lagrangian(options.weight)  # its functions may have to be compiled
             job = Job(scene, grid, *ends, options)
-            job = job.on(job.graded(grid)).with_nodes_where_led_back()
+        job = job.on(job.graded(grid)).with_nodes_where_led_back()
         return split_for_charts(job, options.guess)
 
     def search(self, job: Job, deadline: Deadline, progress: Progress) -> Search:
