@@ -1,7 +1,7 @@
 """Motions of many problems, as recorded: does a change of the method move any of them?
 
-Status, steps, kernel points, intervals and cost of each problem of the corpus (rules_corpus.py)
-whose numbers hardly depend on rounding: those of starts moved by 1e-9 of the ranges agree.
+Status, steps, kernel points and cost of each problem of the corpus (rules_corpus.py) whose numbers
+hardly depend on rounding: those of starts moved by 1e-9 of the ranges agree.
 
     python recorded_motions.py            # what differs from the record (one minute)
     python recorded_motions.py --write    # the record anew (six minutes), and what differs

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 from hovi.system.dataclass import dataclass
 
 ROOM = 2e-7
 """Distance by which bounds are moved inwards while a nearby solution is followed, and by which
 outputs may miss them at the end, relative to the range."""
+ROUGH_BARRIER, ROUGH_DECREASE = 1e-2, 1e-3
+"""Last barrier parameter of a rough solve, relative to the mean density of the objective, and the
+predicted decrease at which it ends, relative to the value."""
 
 
 @dataclass(frozen=True)
@@ -39,3 +44,7 @@ class Criteria:
     enough: float = 0.0
     stalled: float = 0.0
     plain: bool = False
+
+    def rough(self) -> Criteria:
+        """The same for a solve that is to come near a solution only."""
+        return dataclasses.replace(self, barrier=ROUGH_BARRIER, decrease=ROUGH_DECREASE)

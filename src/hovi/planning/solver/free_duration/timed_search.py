@@ -33,10 +33,6 @@ from hovi.system.deadline import raise_if_late
 LAST_DECREASE = 1e-11
 """Relative decrease at which a motion and its duration are accurate: its square root is the
 relative error of the slope in the duration."""
-ROUGH_DECREASE = 1e-3
-"""Relative decrease at which the motion of the first duration is good enough to be stretched."""
-ROUGH_BARRIER = 1e-2
-"""Its last barrier parameter, with which the next solve begins."""
 
 
 def minimum_within_limits(
@@ -81,9 +77,8 @@ class TimedSearch(BoundedSearch):
         return ended
 
     def solve_fixed(self, path: DiscretePath) -> Bounded:
-        """Solve for the problem's duration, roughly."""
-        criteria = self.remaining_criteria()
-        rough = dataclasses.replace(criteria, decrease=ROUGH_DECREASE, barrier=ROUGH_BARRIER)
+        """Solve for the problem's duration, well enough for a motion that is to be stretched."""
+        rough = self.remaining_criteria().rough()
         return self.minimized(self.objective(None), Start(path), rough)
 
     def back_to(self, problem: TrajectoryProblem) -> None:

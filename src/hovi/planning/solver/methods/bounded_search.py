@@ -59,17 +59,12 @@ Array = npt.NDArray[np.float64]
 Bounded = Ended[DiscretePath, Barrier]
 Begun = Start[DiscretePath, Barrier]
 
-ROUGH_BARRIER, ROUGH_DECREASE = 1e-2, 1e-3
-"""Last barrier parameter of a rough solve, relative to the mean density of the cost, and predicted
-decrease at which it ends, relative to the cost."""
 ROUGH_PENALTIES = 10.0, 100.0
 """Penalties of passive torques in rough solves, relative to the mean weight of other joints."""
 FIRST_HALVINGS = 0, 1
 """Number of halvings of intervals for limits on positions, and on their derivatives."""
 FINE_HALVINGS = 2, 3
 """The same where a motion within such limits was not found."""
-WARM_MU_RANGE = 1e-7, 1e-4
-"""Range of the initial barrier parameter of a warm start, relative to the mean density."""
 LEVEL_MARGIN = 0.1
 """Distance of slacks from their bounds at a point of a central path, relative to its parameter."""
 LOOK_AROUND = 0.02
@@ -264,14 +259,10 @@ class BoundedSearch:
         known = rough = first_multipliers(problem, start.x)
         if len(problem.passive) == 0 or start.z is not None:
             return start, known
-        criteria = dataclasses.replace(
-            self.criteria, decrease=ROUGH_DECREASE, barrier=ROUGH_BARRIER
-        )
         for penalty in ROUGH_PENALTIES:
             rough = dataclasses.replace(rough, torque_penalty=penalty * problem.mean_output_weight)
-            objective, left = self.objective(rough), self.deadline.seconds_left
-            limited = dataclasses.replace(criteria, time_limit=left)
-            ended = self.minimized(objective, start, limited)
+            objective = self.objective(rough)
+            ended = self.minimized(objective, start, self.remaining_criteria().rough())
             start = Start(ended.x, ended.z)
             rough = rough.updated(objective.action.residuals(ended.x), problem.passive)
         return start, dataclasses.replace(rough, torque_penalty=known.torque_penalty)

@@ -13,12 +13,7 @@ from hovi.optimize.start import Start
 from hovi.planning.problem.limits import no_limits
 from hovi.planning.solver.central_path import CentralPath
 from hovi.planning.solver.limits.limit_rows import LimitRows
-from hovi.planning.solver.methods.bounded_search import (
-    ROUGH_BARRIER,
-    ROUGH_DECREASE,
-    Bounded,
-    BoundedSearch,
-)
+from hovi.planning.solver.methods.bounded_search import Bounded, BoundedSearch
 from hovi.planning.solver.methods.method import Guess
 from hovi.planning.solver.methods.subproblems import Subproblem, joined, subproblems_of
 from hovi.planning.solver.multipliers import Multipliers, first_multipliers
@@ -209,13 +204,8 @@ def _rough(
     known: multipliers of constraints. mu: the first such parameter, None for a start at the guess.
     most: maximum number of steps.
     """
-    whole = search.remaining_criteria()
-    criteria = dataclasses.replace(
-        whole,
-        barrier=ROUGH_BARRIER,
-        decrease=ROUGH_DECREASE,
-        max_iterations=min(most, whole.max_iterations),
-    )
+    criteria = search.remaining_criteria().rough()
+    criteria = dataclasses.replace(criteria, max_iterations=min(most, criteria.max_iterations))
     objective = search.objective(known, tolerances=None if known is None else ROUGH_TOLERANCES)
     start = Start(path) if mu is None else search.start_at(path, mu, objective)
     return search.minimized(objective, start, criteria), objective.action.multipliers
