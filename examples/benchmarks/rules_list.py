@@ -461,10 +461,32 @@ _rule(
     "_newton_step",
     "_step",
 )
+_at("equations", "planning.solver.augmented_lagrangian_rounds")
+_rule(
+    "large penalty for a warm guess",
+    "A guess that nearly has no passive torque begins with a thousandfold penalty.",
+    "first_multipliers",
+    "fraction <= WARM_TORQUE_FRACTION",
+    "False",
+)
+_rule(
+    "first rounds stop early",
+    "Rounds stop by their residual, not at full accuracy.",
+    "minimize_constrained",
+    "float(np.clip(max(sizes) ** 2, 1e-12, FIRST_DECREASE))",
+    "1e-12",
+)
+_rule(
+    "end where penalties have no effect",
+    "Two larger penalties without effect end the rounds.",
+    "minimize_constrained",
+    "max(stuck) >= MAX_STUCK or _at_maximum_penalty(multipliers, first, slow)",
+    "_at_maximum_penalty(multipliers, first, slow)",
+)
 _at("equations", "planning.solver.methods.lagrange_newton")
 _rule(
     "Lagrange-Newton",
-    "Equations without limits by Newton's method on the KKT equations, not within limits.",
+    "Equations without limits by Newton's method on the KKT equations, not by rounds.",
     "LagrangeNewton.supports",
     "problem.constrained and not problem.limited",
     "False",
@@ -485,19 +507,26 @@ _rule(
 )
 _at("equations", "planning.solver.methods.bounded_search")
 _rule(
-    "rough solves first",
-    "With passive joints within limits two rough solves with small penalties come first.",
-    "BoundedSearch.begun",
-    "len(problem.passive) == 0 or start.z is not None",
-    "True",
+    "equations in the steps",
+    "Within limits steps satisfy conditions at nodes, instead of rounds.",
+    "BoundedSearch.solve",
+    "self._solved_under_equations(start)",
+    "None",
+    False,
 )
-_at("equations", "optimize.interior_point")
 _rule(
-    "end where equations stay unmet",
-    "Equations count among what forty steps have to make smaller.",
-    "_Iteration._try",
-    "max(violation, self.objective.residual(x))",
-    "violation",
+    "rounds begin where the last ended",
+    "Each round within limits begins with the slacks and multipliers of the last.",
+    "BoundedSearch.solve",
+    "len(y) == len(barrier.s) == len(objective.bounds.lower)",
+    "False",
+)
+_rule(
+    "larger last mu in rounds",
+    "Rounds have a last barrier parameter of at least 3e-7.",
+    "BoundedSearch.solve",
+    "max(ROUND_BARRIER, criteria.barrier)",
+    "criteria.barrier",
 )
 _at("warm starts", "planning.solver.methods.bounded_search")
 _rule(

@@ -90,10 +90,6 @@ class BoundedObjective(ABC, Generic[X]):
         """Whether equations hold at x to their tolerance; true without any."""
         return True
 
-    def residual(self, x: X) -> float:
-        """How far equations are from holding at x, in units of the data; 0 without any."""
-        return 0.0
-
     def refine(self, x: X, level: float) -> Refinement | None:
         """Replace outputs by others, which come after those that remain and bound x less.
 

@@ -226,7 +226,7 @@ class _Iteration(BoundedSteps[X]):
         violation = ended.violation
         if violation <= MATCHED:
             self.radius, self.radius_to_restore = max(self.radius, self.radius_to_restore), 0.0
-        self.violations.append(max(violation, self.objective.residual(x)))
+        self.violations.append(violation)
         self._save(x)
         return True
 

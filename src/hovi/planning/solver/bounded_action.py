@@ -24,10 +24,10 @@ from hovi.planning.conditions.function import Points
 from hovi.planning.problem.limits import Limits, limited_columns
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.action_objective import ActionObjective, LinearAlgebra
+from hovi.planning.solver.augmented_lagrangian_rounds import within
 from hovi.planning.solver.limits.limit_rows import LimitRows, push_rows
 from hovi.planning.solver.multipliers import Multipliers
 from hovi.planning.solver.point_outputs import PointOutputs
-from hovi.planning.solver.unmet_equations import within
 from hovi.scene.lagrangian import PointTerms, over_time
 
 Array = npt.NDArray[np.float64]
@@ -325,13 +325,6 @@ class BoundedAction(BoundedObjective[DiscretePath]):
         if self.tolerances is None:
             return True
         return within(self.action.residuals(x), *self.tolerances)
-
-    def residual(self, x: DiscretePath) -> float:
-        """The largest passive torque, relative to any, or residual of a condition at a node."""
-        if self.tolerances is None:
-            return 0.0
-        residuals = self.action.residuals(x)
-        return max(residuals.torque_fraction, residuals.node_error)
 
     def refine(self, x: DiscretePath, level: float) -> Refinement | None:
         """Bound more control points of the motion: see LimitRows."""

@@ -18,9 +18,14 @@ from hovi.optimize.quadratic_model import IntervalSum
 from hovi.planning.conditions.condition import bend_at
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.action_objective import ActionObjective
+from hovi.planning.solver.augmented_lagrangian_rounds import (
+    INITIAL_NODE_PENALTY,
+    NODE_TOLERANCE,
+    TORQUE_TOLERANCE,
+    within,
+)
 from hovi.planning.solver.equations import Equations
-from hovi.planning.solver.multipliers import NODE_PENALTY, Multipliers
-from hovi.planning.solver.unmet_equations import NODE_TOLERANCE, TORQUE_TOLERANCE, within
+from hovi.planning.solver.multipliers import Multipliers
 
 Array = npt.NDArray[np.float64]
 
@@ -53,7 +58,7 @@ class ConstrainedAction(EqualityObjective[DiscretePath]):
         cost = abs(self.problem.ld.action(path))
         expansion = _expand(self.problem.ld, path, "nodal", None, None, self.action.jets(path))
         largest = float(np.max(np.abs(expansion.hessian)))
-        return max(NODE_PENALTY * cost, largest, 1e-6)
+        return max(INITIAL_NODE_PENALTY * cost, largest, 1e-6)
 
     @cached_property
     def negligible(self) -> float:

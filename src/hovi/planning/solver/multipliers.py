@@ -25,11 +25,6 @@ from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 
-TORQUE_PENALTY = 1e4
-"""Penalty of passive torques, relative to the mean weight of the other joints."""
-NODE_PENALTY = 1e3
-"""Penalty of conditions at nodes, relative to the cost, per [rad^2] or [m^2]."""
-
 
 @dataclass(frozen=True, eq=False)
 class Residuals:
@@ -111,12 +106,13 @@ class Multipliers:
             for term, force in zip(terms, self.torque, strict=True)
         ]
 
-
-def first_multipliers(problem: TrajectoryProblem, path: DiscretePath) -> Multipliers:
-    """Zero multipliers, with penalties scaled by the torque weights and the cost of a path."""
-    cost = max(abs(problem.ld.action(path)), 1e-6)
-    penalties = TORQUE_PENALTY * problem.mean_output_weight, NODE_PENALTY * cost
-    return Multipliers.zero(problem, *penalties)
+    def with_scaled_penalties(self, torque: float, node: float) -> Multipliers:
+        """The same multipliers with penalties scaled by the given factors."""
+        return dataclasses.replace(
+            self,
+            torque_penalty=self.torque_penalty * torque,
+            node_penalty=self.node_penalty * node,
+        )
 
 
 def node_residuals(problem: TrajectoryProblem, x: DiscretePath) -> list[Array]:

@@ -15,9 +15,10 @@ from hovi.optimize.barrier import Barrier
 from hovi.optimize.ended import STOPPED, Ended, Outputs, Reason
 from hovi.optimize.start import Start
 from hovi.optimize.trust_region import minimize
+from hovi.planning.solver.augmented_lagrangian_rounds import first_multipliers
 from hovi.planning.solver.bounded_action import BoundedAction
 from hovi.planning.solver.methods.bounded_search import Bounded, BoundedSearch
-from hovi.planning.solver.multipliers import Multipliers, first_multipliers
+from hovi.planning.solver.multipliers import Multipliers
 from hovi.planning.solver.penalized_action import (
     LEAST_VIOLATION_PENALTY,
     PenalizedAction,

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from hovi.discrete.grid import DiscretePath
 from hovi.discrete.instants import Instants
 from hovi.optimize.banded_model import BandModel
-from hovi.optimize.barrier import INITIAL_MARGIN, Barrier
+from hovi.optimize.barrier import INITIAL_MARGIN, WARM_START_MARGIN, Barrier
 from hovi.optimize.criteria import Criteria
 from hovi.optimize.ended import Ended, Iteration, Reason
 from hovi.optimize.equation_model import EquationModel
@@ -32,6 +32,13 @@ from hovi.planning.problem.limits import Limits
 from hovi.planning.problem.presolve.end_torques import static_sentence
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.action_objective import LinearAlgebra
+from hovi.planning.solver.augmented_lagrangian_rounds import (
+    NODE_TOLERANCE,
+    TORQUE_TOLERANCE,
+    first_multipliers,
+    minimize_constrained,
+    spurious_sentence,
+)
 from hovi.planning.solver.bounded_action import BoundedAction
 from hovi.planning.solver.central_path import CentralPath
 from hovi.planning.solver.clearance_outputs import EXTRA_CLEARANCE, ClearanceOutputs
@@ -39,18 +46,10 @@ from hovi.planning.solver.condition_outputs import ConditionOutputs
 from hovi.planning.solver.limits.limit_rows import LimitRows
 from hovi.planning.solver.limits.row_forces import by_segment, forces_of, joined
 from hovi.planning.solver.methods.method import Guess, Report
-from hovi.planning.solver.multipliers import Multipliers, first_multipliers
+from hovi.planning.solver.multipliers import Multipliers
 from hovi.planning.solver.near.clearance_rows import ClearanceRows
 from hovi.planning.solver.near.cleared_action import ClearedAction
 from hovi.planning.solver.point_outputs import PointOutputs, joint_outputs
-from hovi.planning.solver.unmet_equations import (
-    FEASIBLE_RESIDUAL,
-    NODE_TOLERANCE,
-    TORQUE_TOLERANCE,
-    spurious_sentence,
-    unmet_sentence,
-    within,
-)
 from hovi.scene.lagrangian import PointTerms
 from hovi.system.dataclass import dataclass
 from hovi.system.deadline import Deadline, raise_if_late
@@ -59,12 +58,14 @@ Array = npt.NDArray[np.float64]
 Bounded = Ended[DiscretePath, Barrier]
 Begun = Start[DiscretePath, Barrier]
 
-ROUGH_PENALTIES = 10.0, 100.0
-"""Penalties of passive torques in rough solves, relative to the mean weight of other joints."""
+ROUND_BARRIER = 3e-7
+"""Least last barrier parameter in rounds of an augmented Lagrangian, relative to the density."""
 FIRST_HALVINGS = 0, 1
 """Number of halvings of intervals for limits on positions, and on their derivatives."""
 FINE_HALVINGS = 2, 3
 """The same where a motion within such limits was not found."""
+WARM_MU_RANGE = 1e-7, 1e-4
+"""Range of the initial barrier parameter of a warm start, relative to the mean density."""
 LEVEL_MARGIN = 0.1
 """Distance of slacks from their bounds at a point of a central path, relative to its parameter."""
 LOOK_AROUND = 0.02
@@ -235,46 +236,34 @@ class BoundedSearch:
         return dataclasses.replace(self.criteria, time_limit=self.deadline.seconds_left)
 
     def solve(self, start: Begun) -> Bounded:
-        """Solve with bounds at the quadrature points, by steps that satisfy the equations."""
+        """Solve with bounds at the quadrature points; in rounds for passive torques."""
         if not self.problem.constrained:
             return self.minimized(self.objective(None), start, self.remaining_criteria())
-        start, known = self.begun(start)
-        objective = self.objective(known, tolerances=(TORQUE_TOLERANCE, NODE_TOLERANCE))
-        ended = self.minimized(objective, start, self.remaining_criteria())
-        self.unmet = self._unmet(ended, objective)
-        if ended.why is not Reason.DIVERGED:
-            self.multipliers = objective.action.multipliers
+        if len(self.problem.passive) == 0:
+            found = self._solved_under_equations(start)
+            if found is not None:
+                return found
+
+        z = start.z
+
+        def minimize_round(known: Multipliers, x: DiscretePath, decrease: float) -> Bounded:
+            nonlocal z
+            objective, criteria = self.objective(known), self.remaining_criteria()
+            decrease, mu = max(decrease, criteria.decrease), max(ROUND_BARRIER, criteria.barrier)
+            criteria = dataclasses.replace(criteria, decrease=decrease, barrier=mu)
+            ended = self.minimized(objective, Start(x, z), criteria)
+            fraction = float(np.clip(decrease**0.5, ROUND_BARRIER, WARM_MU_RANGE[1]))
+            mu = fraction * ended.outputs.density(objective.bounds.measure)
+            y, barrier = ended.outputs.y, ended.z
+            z = None
+            if len(y) == len(barrier.s) == len(objective.bounds.lower):
+                margin = min(fraction, WARM_START_MARGIN)
+                z = Barrier.central(objective.bounds, y, mu, None, margin, barrier)
+            return ended
+
+        rounds = minimize_constrained(self.problem, start.x, minimize_round, self.multipliers)
+        ended, self.multipliers, self.unmet = rounds
         return ended
-
-    def begun(self, start: Begun) -> tuple[Begun, Multipliers]:
-        """A start and multipliers of the equations.
-
-        Of passive joints, unless they are known, they are those of rough solves with penalties: far
-        from a solution limits and equations are in each other's way, and a small penalty lets the
-        joints carry some torque.
-        """
-        problem = self.problem
-        if self.multipliers is not None:
-            return start, self.multipliers
-        known = rough = first_multipliers(problem, start.x)
-        if len(problem.passive) == 0 or start.z is not None:
-            return start, known
-        for penalty in ROUGH_PENALTIES:
-            rough = dataclasses.replace(rough, torque_penalty=penalty * problem.mean_output_weight)
-            objective = self.objective(rough)
-            ended = self.minimized(objective, start, self.remaining_criteria().rough())
-            start = Start(ended.x, ended.z)
-            rough = rough.updated(objective.action.residuals(ended.x), problem.passive)
-        return start, dataclasses.replace(rough, torque_penalty=known.torque_penalty)
-
-    def _unmet(self, ended: Bounded, objective: BoundedAction) -> str:
-        """Why equations do not hold at the end of a solve, or at a spurious root; else ""."""
-        if ended.why not in (Reason.STATIONARY, Reason.DIVERGED):
-            return ""
-        residuals = objective.action.residuals(ended.x)
-        if not within(residuals, FEASIBLE_RESIDUAL, FEASIBLE_RESIDUAL):
-            return unmet_sentence(self.problem, ended.x, residuals)
-        return spurious_sentence(self.problem, ended.x)
 
     def solve_at_level(self, path: DiscretePath, level: float) -> Bounded:
         """Solve from a point of a central path, or one near it.
@@ -303,6 +292,19 @@ class BoundedSearch:
         z = Barrier.central(objective.bounds, outputs.y, level * density, scale, margin)
         return Start(path, z)
 
+    def _solved_under_equations(self, start: Begun) -> Bounded | None:
+        """A solve whose steps satisfy the conditions at nodes; None where that fails."""
+        known = self.multipliers or first_multipliers(self.problem, start.x)
+        objective = self.objective(known, tolerances=(TORQUE_TOLERANCE, NODE_TOLERANCE))
+        ended = self.minimized(objective, start, self.remaining_criteria())
+        satisfied = objective.satisfies_equations(ended.x)
+        if ended.why is Reason.DIVERGED or (ended.why is Reason.STATIONARY and not satisfied):
+            return None
+        self.multipliers = objective.action.multipliers
+        spurious = ended.why is Reason.STATIONARY
+        self.unmet = spurious_sentence(self.problem, ended.x) if spurious else ""
+        return ended
+
     def minimized(self, objective: BoundedAction, start: Begun, criteria: Criteria) -> Bounded:
         """One solve of an objective. start: see minimize_bounded."""
         raise_if_late()  # the outputs at the guess alone may take seconds
@@ -327,7 +329,7 @@ class BoundedSearch:
     def forces(self, ended: Bounded) -> tuple[Instants | None, list[PointTerms]]:
         """The instants between the points at which limits act, and all multipliers.
 
-        Those of limits and constraints.
+        Those of limits and constraints, penalty terms of the constraints included.
         """
         multipliers, objective = ended.z.multipliers, self._objective_of(ended)
         if isinstance(objective, ClearedAction):
@@ -345,6 +347,8 @@ class BoundedSearch:
         """Those of limits at the quadrature points and of constraints."""
         known = self.multipliers
         if known is not None:
+            action = self.objective(known).action
+            known = known.updated(action.residuals(ended.x), self.problem.passive)
             return self.objective(known).forces(ended.x, ended.z.multipliers)
         return self._objective_of(ended).forces(ended.x, ended.z.multipliers)
 

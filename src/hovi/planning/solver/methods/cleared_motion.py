@@ -11,12 +11,17 @@ from hovi.discrete.grid import DiscretePath
 from hovi.optimize.ended import STOPPED, Reason
 from hovi.optimize.start import Start
 from hovi.planning.problem.limits import no_limits
+from hovi.planning.solver.action_objective import ActionObjective
+from hovi.planning.solver.augmented_lagrangian_rounds import (
+    first_multipliers,
+    minimize_constrained,
+)
 from hovi.planning.solver.central_path import CentralPath
 from hovi.planning.solver.limits.limit_rows import LimitRows
 from hovi.planning.solver.methods.bounded_search import Bounded, BoundedSearch
 from hovi.planning.solver.methods.method import Guess
 from hovi.planning.solver.methods.subproblems import Subproblem, joined, subproblems_of
-from hovi.planning.solver.multipliers import Multipliers, first_multipliers
+from hovi.planning.solver.multipliers import Multipliers
 from hovi.planning.solver.near.clearance_rows import ClearanceRows
 from hovi.planning.solver.near.push_out import pushed_out
 from hovi.system.dataclass import dataclass
@@ -34,9 +39,10 @@ SECOND_STEPS, LEAST_SECOND_STEPS = 3, 20
 """The same for a second rough motion: per step of the first one, and at least."""
 ROUGH_VIOLATION = 0.05
 """Largest violation of a bound, relative to its range, from which a rough motion is solved on."""
-ROUGH_TOLERANCES = 1e-4, 1e-4
-"""Passive torque, relative to the largest torque, and residual of conditions at nodes, in [rad] or
-[m], at which it ends."""
+ROUGH_TOLERANCE = 1e-4
+"""Residual of conditions at nodes at which it ends, in [rad] or [m]."""
+ROUGH_ROUNDS = 3
+"""Rounds of an augmented Lagrangian for a rough motion."""
 SUBPROBLEM_LEVEL = 3e-4
 """Barrier parameter at which the subproblems of a motion are joined, relative to the cost's mean
 density: small enough that each stays where it is, and large enough for the accelerations at the
@@ -139,8 +145,14 @@ def _without_distances(search: BoundedSearch, guess: DiscretePath) -> Bounded:
 
 def _rough_with_constraints(search: BoundedSearch, guess: DiscretePath) -> Bounded:
     """A rough motion that nearly satisfies the constraints."""
-    start, known = search.begun(Start(guess))
-    return _rough(search, start.x, known, None)[0]
+    problem = search.problem
+
+    def minimize_round(known: Multipliers, x: DiscretePath, _: float) -> Bounded:
+        return _rough(search, x, known, None if x is guess else FIRST_MU)[0]
+
+    if len(problem.passive) == 0:
+        return _rough(search, guess, first_multipliers(problem, guess), None)[0]
+    return minimize_constrained(problem, guess, minimize_round, most=ROUGH_ROUNDS)[0]
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,6 +201,9 @@ def _rough_with_distances(
     violation = ended.violation
     if ended.why is Reason.DIVERGED or violation > ROUGH_VIOLATION:
         return None
+    if known is not None and len(problem.passive) > 0:
+        residuals = ActionObjective(problem, multipliers=known).residuals(ended.x)
+        known = known.updated(residuals, problem.passive)
     return _Rough(ended, known, search.rows, search.near)
 
 
@@ -206,6 +221,7 @@ def _rough(
     """
     criteria = search.remaining_criteria().rough()
     criteria = dataclasses.replace(criteria, max_iterations=min(most, criteria.max_iterations))
-    objective = search.objective(known, tolerances=None if known is None else ROUGH_TOLERANCES)
+    steps = known is not None and len(search.problem.passive) == 0
+    objective = search.objective(known, tolerances=(np.inf, ROUGH_TOLERANCE) if steps else None)
     start = Start(path) if mu is None else search.start_at(path, mu, objective)
     return search.minimized(objective, start, criteria), objective.action.multipliers

@@ -10,11 +10,11 @@ from hovi.discrete.grid import DiscretePath
 from hovi.optimize.barrier import Barrier
 from hovi.optimize.ended import STOPPED, Reason
 from hovi.optimize.start import Start
+from hovi.planning.solver.augmented_lagrangian_rounds import first_multipliers
 from hovi.planning.solver.central_path import CentralPath
 from hovi.planning.solver.limits.restored_motion import locally_infeasible, restored_motion
 from hovi.planning.solver.methods.bounded_search import Bounded, BoundedSearch
 from hovi.planning.solver.methods.cleared_motion import cleared_motion
-from hovi.planning.solver.multipliers import first_multipliers
 
 NEARBY_MU = 1e-2
 """First barrier parameter from a motion that nearly is a solution, relative to the mean density of

@@ -36,7 +36,7 @@ def takes_rows(problem: TrajectoryProblem) -> bool:
 
 
 class InteriorPoint(Method):
-    """A primal-dual interior-point method; equations hold in its steps.
+    """A primal-dual interior-point method; passive torques by an augmented Lagrangian around it.
 
     First a motion within bounds at the quadrature points is found; then bounds are tightened and
     intervals halved until the limits hold everywhere to their tolerance.

@@ -17,26 +17,23 @@ from hovi.optimize.trust_region import minimize
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.answer import Answer
-from hovi.planning.solver.constrained_action import ConstrainedAction
-from hovi.planning.solver.methods.method import Guess, Method, Report
-from hovi.planning.solver.multipliers import first_multipliers
-from hovi.planning.solver.outcome.cost_with_time import price_of_time
-from hovi.planning.solver.status import Status, status_of
-from hovi.planning.solver.unmet_equations import (
+from hovi.planning.solver.augmented_lagrangian_rounds import (
     FEASIBLE_RESIDUAL,
+    FIRST_DECREASE,
+    WARM_TORQUE_FRACTION,
+    first_multipliers,
     missed_sentence,
     spurious_sentence,
     unmet_sentence,
     within,
 )
+from hovi.planning.solver.constrained_action import ConstrainedAction
+from hovi.planning.solver.methods.method import Guess, Method, Report
+from hovi.planning.solver.outcome.cost_with_time import price_of_time
+from hovi.planning.solver.status import Status, status_of
 from hovi.system.deadline import Deadline, OutOfTimeError
 
 Array = npt.NDArray[np.float64]
-
-FIRST_DECREASE = 1e-3
-"""Relative decrease at which the minimisation with a penalty stops."""
-WARM_TORQUE_FRACTION = 0.1
-"""Passive torque of a guess, relative to the largest torque, up to which it is near a minimum."""
 
 
 class LagrangeNewton(Method):

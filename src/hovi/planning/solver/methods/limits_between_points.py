@@ -11,13 +11,15 @@ from hovi.discrete.guess import stretched
 from hovi.optimize.barrier import WARM_START_MARGIN, Barrier
 from hovi.optimize.ended import STOPPED, Reason
 from hovi.optimize.start import Start
-from hovi.planning.solver.methods.bounded_search import Bounded, BoundedSearch
+from hovi.planning.solver.methods.bounded_search import (
+    WARM_MU_RANGE,
+    Bounded,
+    BoundedSearch,
+)
 from hovi.planning.solver.methods.feasibility import feasible_motion, solved_from
 
 Array = npt.NDArray[np.float64]
 
-WARM_MU_RANGE = 1e-7, 1e-4
-"""Range of the initial barrier parameter of a warm start, relative to the mean density."""
 MAX_ROUNDS = 40
 """Maximum number of rounds, each of which tightens bounds or halves intervals."""
 MAX_ROUNDS_PER_GRID = 9
