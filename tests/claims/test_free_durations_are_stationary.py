@@ -30,11 +30,21 @@ def ur5() -> tuple[hovi.Scene, hovi.State, hovi.State]:
     return task.scene, task.start, task.goal
 
 
+def frame(scene: hovi.Scene, start: hovi.State, goal: hovi.State) -> tuple[Any, ...]:
+    """The task with the goal as that of its frame alone."""
+    robot = scene.robot
+    position = robot.frame_position(robot.tip_frame, np.asarray(goal.q))
+    aim = hovi.FrameGoal(robot.tip_frame, position=position, guess=np.asarray(goal.q))
+    return scene, start, aim
+
+
 TASKS: dict[str, tuple[Callable[[], tuple[Any, ...]], Any]] = {
     "at rest": (lambda: (arm(), *REST), "none"),
     "moving": (lambda: (arm(), *MOVING), "none"),
     "six joints": (ur5, "none"),
     "within limits": (lambda: (arm(), *MOVING), TORQUES),
+    "a frame within limits": (lambda: frame(arm(), *REST), TORQUES),
+    "a frame of six joints within limits": (lambda: frame(*ur5()), {"v": 0.8}),
 }
 
 

@@ -8,6 +8,7 @@ import scipy.linalg
 
 from hovi._native import band as native
 from hovi.optimize.banded_model import BandLayout
+from hovi.optimize.bordered_model import Border, BorderedModel
 from hovi.optimize.equation_model import SOFTNESS, EquationFactor, EquationModel
 from hovi.optimize.kkt_model import ConstraintRows, KktLayout, KktModel
 from hovi.optimize.quadratic_model import IntervalSum
@@ -218,7 +219,7 @@ def test_newton_steps_under_equations_solve_the_softened_kkt_system() -> None:
     step, slope, length = steps.descend(factor)
     np.testing.assert_allclose(step, s, atol=1e-9 * np.abs(s).max())
     assert length == pytest.approx(step @ steps.metric_product(step), rel=1e-10)
-    reaction = steps.reaction(steps.gradient, factor)
+    reaction = steps.reaction(steps.gradient, step, factor)
     assert reaction is not None
     np.testing.assert_allclose(reaction[0], z, rtol=1e-7)
     assert reaction[1] == pytest.approx(z @ steps.residual, rel=1e-7)
@@ -246,7 +247,7 @@ def test_a_shift_leaves_equations_to_the_penalty() -> None:
     plain = steps.inner.factor(0.5)
     assert plain is not None
     np.testing.assert_array_equal(step, steps.inner.descend(plain)[0])
-    assert steps.reaction(steps.gradient, factor) is None
+    assert steps.reaction(steps.gradient, step, factor) is None
 
 
 def test_curvature_across_equations_alone_needs_to_be_positive() -> None:
@@ -257,3 +258,45 @@ def test_curvature_across_equations_alone_needs_to_be_positive() -> None:
         tangent = int(np.sum(np.linalg.eigvalsh(Z.T @ H @ Z) < 0))
         assert steps.negative_eigenvalues() == tangent
         assert (steps.factor(0.0) is not None) == (tangent == 0)
+
+
+def bordered(corner: float, room: tuple[float, float]) -> tuple[BorderedModel, Array, Array]:
+    """A model under equations with one more unknown, its dense Hessian with that, and A."""
+    inner, H, A = under_equations()
+    column = np.random.default_rng(4).standard_normal(len(H))
+    whole = np.block([[H, column[:, None]], [column, corner]])
+    model = BorderedModel(inner, Border(-1.5, column, corner, 3.0, room))
+    return model, whole, np.pad(A, ((0, 0), (0, 1)))
+
+
+@pytest.mark.parametrize("room", [(-9.0, 9.0), (-1e-3, 1e-3)])
+def test_newton_steps_with_one_more_unknown_solve_its_kkt_system(room: tuple[float, float]) -> None:
+    model, H, A = bordered(50.0, room)
+    assert isinstance(model.inner, EquationModel)
+    delta, residual = SOFTNESS / 1e3, model.inner.residual
+    softened = H + A.T @ A / delta  # by elimination of the multipliers
+    gradient = model.gradient + A.T @ residual / delta
+    factor = model.factor(0.0)
+    step, slope, _ = model.descend(factor)
+    assert room[0] <= step[-1] <= room[1]
+    free = np.ones(len(H), dtype=bool)
+    free[-1] = abs(step[-1]) < room[1]
+    expected = step.copy()
+    rest = gradient[free] + softened[np.ix_(free, ~free)] @ step[~free]
+    expected[free] = np.linalg.solve(softened[np.ix_(free, free)], -rest)
+    np.testing.assert_allclose(step, expected, atol=1e-7 * np.abs(expected).max())
+    decrease = -model.gradient @ step - 0.5 * step @ H @ step
+    assert -0.5 * slope == pytest.approx(decrease, rel=1e-4)
+    z, product = model.reaction(model.gradient, step, factor)
+    left = H[:-1] @ step + A[:, :-1].T @ z + model.gradient[:-1]
+    np.testing.assert_allclose(left, 0.0, atol=1e-8 * np.abs(model.gradient).max())
+    assert product == pytest.approx(z @ residual, rel=1e-9)
+
+
+@pytest.mark.parametrize("corner", [-5.0, 0.02, 50.0])
+def test_the_inertia_with_one_more_unknown_is_that_of_the_tangent_space(corner: float) -> None:
+    model, H, A = bordered(corner, (-9.0, 9.0))
+    Z = scipy.linalg.null_space(A)
+    negative = int(np.sum(np.linalg.eigvalsh(Z.T @ H @ Z) < 0))
+    assert model.negative_eigenvalues() == negative
+    assert (model.factor(0.0) is None) == (negative > 0)

@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.optimize.banded_model import BandModel
+from hovi.optimize.equation_model import EquationModel
 from hovi.optimize.quadratic_model import Factor, QuadraticModel
 from hovi.system.dataclass import dataclass
 
@@ -56,9 +57,12 @@ class BorderedFactor:
 
 
 class BorderedModel(QuadraticModel):
-    """A banded model with one more unknown, the last one, whose steps have bounds."""
+    """A banded model with one more unknown, the last one, whose steps have bounds.
 
-    def __init__(self, inner: BandModel, border: Border) -> None:
+    Equations of the inner model do not depend on it.
+    """
+
+    def __init__(self, inner: BandModel | EquationModel, border: Border) -> None:
         self.inner = inner
         self.border = border
         self.intervals = inner.intervals
@@ -87,7 +91,7 @@ class BorderedModel(QuadraticModel):
         if pivot > 0:
             return BorderedFactor(inner, border.column, solved, pivot)
         # the slope of the cost in t, all else at its minimum for every t
-        slope = border.slope - float(solved @ self.inner.gradient)
+        slope = border.slope + float(border.column @ self.inner.descend(inner)[0])
         low, high = border.room
         kept = (low == 0 and slope > 0) or (high == 0 and slope < 0)
         return BorderedFactor(inner, border.column, solved, None) if kept else None
@@ -98,15 +102,24 @@ class BorderedModel(QuadraticModel):
         Where a bound of t holds with a multiplier m, m t is added to the slope, so that the
         decrease is -slope/2 + shift/2 times the length squared in any case.
         """
-        s = factor.solve(-self.gradient)
-        t = float(np.clip(s[-1], *self.border.room))
-        multiplier = 0.0
-        if t != s[-1] and isinstance(factor, BorderedFactor) and factor.pivot is not None:
-            multiplier = factor.pivot * (t - s[-1])
-            s[:-1] += (s[-1] - t) * factor.solved
-            s[-1] = t
-        slope = float(self.gradient @ s) + multiplier * t
-        return s, slope, float(s @ self.metric_product(s))
+        assert isinstance(factor, BorderedFactor)
+        x, slope, _ = self.inner.descend(factor.inner)
+        t = multiplier = 0.0
+        rate = self.border.slope + float(self.border.column @ x)  # with all else at its minimum
+        if factor.pivot is not None:
+            free = -rate / factor.pivot
+            t = float(np.clip(free, *self.border.room))
+            multiplier = factor.pivot * (t - free)
+        s = np.append(x - t * factor.solved, t)
+        return s, slope + (rate + multiplier) * t, float(s @ self.metric_product(s))
+
+    def reaction(
+        self, gradient: Array, s: Array, factor: Factor | None
+    ) -> tuple[Array, float] | None:
+        """That of the inner model, for the gradient that the last unknown leaves it."""
+        if not isinstance(factor, BorderedFactor):
+            return None
+        return self.inner.reaction(gradient[:-1] + s[-1] * self.border.column, s[:-1], factor.inner)
 
     def curvature_scale(self) -> float:
         """That of the other unknowns."""

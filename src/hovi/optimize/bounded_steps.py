@@ -190,7 +190,7 @@ class BoundedSteps(Generic[X]):
         slope = float(np.vdot(model.gradient, s)) - float(np.vdot(weights * self.rho, along.dy))
         gradient = model.gradient if pulled is None else model.gradient + pulled
         norm2 = trial.norm**2 if pulled is None else float(np.vdot(s, model.metric_product(s)))
-        whole, reaction = -float(np.vdot(gradient, s)), model.reaction(gradient, trial.factor)
+        whole, reaction = -float(np.vdot(gradient, s)), model.reaction(gradient, s, trial.factor)
         reacted = 0.0 if reaction is None else reaction[1]
         whole += reacted
         square = whole - trial.shift * norm2

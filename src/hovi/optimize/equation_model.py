@@ -77,7 +77,9 @@ class EquationModel(QuadraticModel):
         slope = float(self.gradient @ s) + float(z @ (self.residual - self.delta * z))
         return s, slope, float(s @ self.metric_product(s))
 
-    def reaction(self, gradient: Array, factor: Factor | None) -> tuple[Array, float] | None:
+    def reaction(
+        self, gradient: Array, s: Array, factor: Factor | None
+    ) -> tuple[Array, float] | None:
         """z of a step for a gradient, and z c; None for a step without equations."""
         if not isinstance(factor, EquationFactor):
             return None
@@ -88,6 +90,6 @@ class EquationModel(QuadraticModel):
         """That of the model alone."""
         return self.inner.curvature_scale()
 
-    def negative_eigenvalues(self) -> int:
-        """Number of negative eigenvalues of H on the tangent space A s = 0."""
-        return self.kkt.negative_eigenvalues()
+    def negative_eigenvalues(self, border: tuple[Array, float] | None = None) -> int:
+        """Number of negative eigenvalues of H, or [H b; b^T c], on the tangent space A s = 0."""
+        return self.kkt.negative_eigenvalues(border)

@@ -346,13 +346,15 @@ class KktModel:
         matrix.ravel()[self.layout.corners] = -delta
         return KktFactor(self.layout, matrix, self.metric, shift, removed, rho)
 
-    def negative_eigenvalues(self) -> int:
+    def negative_eigenvalues(self, border: tuple[Array, float] | None = None) -> int:
         """Number of negative eigenvalues of H on the tangent space A s = 0; -1 if undecided.
 
         Those of the KKT matrix less the number of equations: see [Gould1985]. Two values of delta
         have to agree.
+        border: a further row b of H and its diagonal entry c, of an unknown that no equation has.
         """
-        counts = {self._without_delta(0.0, d * DELTA).negative for d in (1.0, 1e-2)}
+        factors = [self._without_delta(0.0, d * DELTA) for d in (1.0, 1e-2)]
+        counts = {factor.negative + _beyond(factor, border) for factor in factors}
         return -1 if len(counts) > 1 else max(counts.pop() - self.equations, -1)
 
     def jacobian_product(self, s: Array) -> Array:
@@ -389,6 +391,15 @@ class KktModel:
     def least_squares_multipliers(self) -> Array:
         """The change of y that makes the gradient smallest, in the norm of D^-1."""
         return self.normal_factor(1.0).solve(-self.gradient, np.zeros(self.equations))[1]
+
+
+def _beyond(factor: KktFactor, border: tuple[Array, float] | None) -> int:
+    """Number of negative eigenvalues that a further row adds: see Haynsworth's inertia."""
+    if border is None or factor.negative < 0:
+        return 0
+    column, corner = border
+    solved, _ = factor.solve(column, np.zeros(len(factor.layout.multipliers)))
+    return int(corner < float(column @ solved))
 
 
 def size_of(c: Array) -> float:

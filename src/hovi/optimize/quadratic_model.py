@@ -68,8 +68,10 @@ class QuadraticModel(ABC):
         slope = float(np.vdot(self.gradient, s))
         return s, slope, float(np.vdot(s, self.metric_product(s)))
 
-    def reaction(self, gradient: Array, factor: Factor | None) -> tuple[Array, float] | None:
-        """Multipliers of equations of a step for a gradient, and their product with the residual.
+    def reaction(
+        self, gradient: Array, s: Array, factor: Factor | None
+    ) -> tuple[Array, float] | None:
+        """Multipliers of equations of the step s for a gradient, and z c for the residual c.
 
         None for a step, or a model, without equations.
         """

@@ -32,12 +32,15 @@ from hovi.system.interruption import interruptible
 def solves_jointly(problem: TrajectoryProblem) -> bool:
     """Whether the duration can be an unknown of a problem's motion.
 
-    Not with equations, conditions or obstacles, on which more depends than the discrete Lagrangian
-    and the limits at the points; not with limits on the torque rate, which are imposed after a
-    first solve; not from a start outside its limits, whose way back takes a time of its own; nor on
-    grids of so many intervals that they need the merge tree.
+    Not with conditions or obstacles, on which more depends than the discrete Lagrangian and the
+    limits at the points; not with equations, but for those of configurations at nodes within
+    limits; not with limits on the torque rate, which are imposed after a first solve; not from a
+    start outside its limits, whose way back takes a time of its own; nor on grids of so many
+    intervals that they need the merge tree.
     """
-    simple = not (problem.constrained or problem.periodic or problem.via or problem.bounds)
+    simple = not (problem.periodic or problem.via or problem.bounds or len(problem.passive) > 0)
+    of_motion = any(each.y.needs - {"q"} for each in problem.equations)
+    simple = simple and not of_motion and (problem.limited or not problem.equations)
     timed = problem.ld.lagrangian.timed or problem.ld.segments is not None
     limits = problem.limits
     rates = limits is not None and (limits.on_torque_rate or bool(limits.excused))

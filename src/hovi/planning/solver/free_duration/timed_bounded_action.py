@@ -25,6 +25,7 @@ from hovi.planning.solver.free_duration.timed_path import (
     stretched_problem,
 )
 from hovi.planning.solver.limits.limit_rows import LimitRows
+from hovi.planning.solver.multipliers import Multipliers
 
 Array = npt.NDArray[np.float64]
 
@@ -40,8 +41,8 @@ class TimedBoundedAction(BoundedObjective[TimedPath]):
     The points have the weights h w of the first duration T0: those of the barrier do not depend on
     the unknowns, and the forces of limits count T0 / T times in the integral over T.
 
-    problem: with limits, without obstacles and equations, on a grid that the band supports, for the
-    duration T0. limits, margins, rows: as for BoundedAction. price: of time.
+    problem: with limits, without obstacles, on a grid that the band supports, for the duration T0.
+    limits, margins, rows, multipliers, tolerances: as for BoundedAction. price: of time.
     """
 
     radii = 20.0, 20.0  # a long step in time leads to another motion
@@ -53,12 +54,15 @@ class TimedBoundedAction(BoundedObjective[TimedPath]):
         margins: Array | None,
         price: TimePrice,
         rows: LimitRows,
+        multipliers: Multipliers | None = None,
+        tolerances: tuple[float, float] | None = None,
     ) -> None:
         self.problem = problem
         self.limits = limits
         self.margins = margins
         self.price = price
         self.rows = rows
+        self.multipliers, self.tolerances = multipliers, tolerances
         self._at: dict[float, _AtDuration] = {}
         self._first = self._begun()
         self.bounds = self._first.bounds
@@ -67,17 +71,18 @@ class TimedBoundedAction(BoundedObjective[TimedPath]):
 
     def at(self, duration: float) -> _AtDuration:
         """The bounded action for a duration, in [s]; the first and the last two are kept."""
-        if duration == self.problem.grid.duration:
-            return self._first
-        if duration not in self._at:
+        found = self._first if duration == self.problem.grid.duration else self._at.get(duration)
+        if found is None:
             if len(self._at) > 1:
                 del self._at[next(iter(self._at))]
-            self._at[duration] = self._first.stretched(duration)
-        return self._at[duration]
+            found = self._at[duration] = self._first.stretched(duration)
+        found.action.multipliers = self.multipliers
+        return found
 
     def _begun(self) -> _AtDuration:
         """The bounded action for the first duration, of which the others are stretched ones."""
-        return _AtDuration(self.problem, self.limits, self.margins, self.rows)
+        known = self.multipliers, self.tolerances
+        return _AtDuration(self.problem, self.limits, self.margins, self.rows, *known)
 
     def action(self, duration: float) -> ActionObjective:
         """The action for a duration, in [s]."""
@@ -134,6 +139,17 @@ class TimedBoundedAction(BoundedObjective[TimedPath]):
         assert isinstance(model, TimedModel)
         self._slopes = model.predicted_slopes(step)
 
+    def hold(self, x: TimedPath, change: Array) -> float:
+        """See BoundedObjective.hold."""
+        action = self.action(x.duration)
+        added = action.hold(x.path, change)
+        self.multipliers = action.multipliers
+        return added
+
+    def satisfies_equations(self, x: TimedPath) -> bool:
+        """Whether equations hold to their tolerances."""
+        return self.at(x.duration).satisfies_equations(x.path)
+
     def refine(self, x: TimedPath, level: float) -> Refinement | None:
         """Bound more control points of the motion: see LimitRows."""
         found = self.at(x.duration).refine(x.path, level)
@@ -153,10 +169,16 @@ class _AtDuration(BoundedAction):
     """The bounded action for one duration, whose predicted outputs come from another."""
 
     def __init__(
-        self, problem: TrajectoryProblem, limits: Limits, margins: Array | None, rows: LimitRows
+        self,
+        problem: TrajectoryProblem,
+        limits: Limits,
+        margins: Array | None,
+        rows: LimitRows,
+        known: Multipliers | None,
+        tolerances: tuple[float, float] | None,
     ) -> None:
-        super().__init__(problem, limits, margins, "band", rows=rows)
-        self.extended = rows
+        super().__init__(problem, limits, margins, "band", known, rows=rows)
+        self.extended, self.tolerances = rows, tolerances
         self.action.keep_points = True
 
     def stretched(self, duration: float) -> _AtDuration:
@@ -167,7 +189,8 @@ class _AtDuration(BoundedAction):
         ratio = duration / self.problem.grid.duration
         other = copy.copy(self)
         other.problem = stretched_problem(self.problem, duration)
-        other.action = ActionObjective(other.problem, "band", keep_points=True)
+        known = self.action.multipliers
+        other.action = ActionObjective(other.problem, "band", multipliers=known, keep_points=True)
         other.ld, other.lagrangian = other.action.ld, other.action.lagrangian
         lower, upper, weights = self._at_points
         other._at_points = lower, upper, ratio * weights

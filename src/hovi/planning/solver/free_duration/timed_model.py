@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from hovi.optimize.banded_model import BandModel
 from hovi.optimize.bordered_model import Border, BorderedModel
+from hovi.optimize.equation_model import EquationModel
 from hovi.optimize.quadratic_model import QuadraticModel
 from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.free_duration.duration_border import (
@@ -49,7 +50,7 @@ class TimedModel(BorderedModel):
         forces: Sequence[Forces] | None = None,
         rows: RowForces | None = None,
     ) -> None:
-        assert isinstance(inner, BandModel)
+        assert isinstance(inner, BandModel | EquationModel)
         self.action = action
         self.x = x
         self.rows = rows

@@ -19,9 +19,16 @@ from hovi.optimize.start import Start
 from hovi.planning.problem.limits import Limits
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.answer import Answer, answered
+from hovi.planning.solver.augmented_lagrangian_rounds import spurious_sentence
 from hovi.planning.solver.free_duration.timed_bounded_action import TimedBoundedAction
 from hovi.planning.solver.free_duration.timed_path import TimedPath, TimePrice, stretched_path
-from hovi.planning.solver.methods.bounded_search import Begun, Bounded, BoundedSearch
+from hovi.planning.solver.methods.bounded_search import (
+    EXACT_TOLERANCES,
+    ROUGH_TOLERANCES,
+    Begun,
+    Bounded,
+    BoundedSearch,
+)
 from hovi.planning.solver.methods.feasibility import solved_from
 from hovi.planning.solver.methods.limits_between_points import tightened, usable
 from hovi.planning.solver.methods.method import Guess
@@ -62,24 +69,33 @@ class TimedSearch(BoundedSearch):
         raise_if_late()
         problem, criteria = self.problem, self.remaining_criteria()
         criteria = dataclasses.replace(criteria, decrease=LAST_DECREASE, plain=False)
-        objective = TimedBoundedAction(problem, self.limits, self.margins, self.price, self.rows)
+        common = problem, self.limits, self.margins, self.price, self.rows
+        known = self.known_multipliers(start.x)
+        objective = TimedBoundedAction(*common, known, None if known is None else EXACT_TOLERANCES)
         x = TimedPath(start.x, problem.grid.duration)
         found = minimize_bounded(objective, Start(x, start.z), criteria, self.report)
         self.iterations += len(found.steps)
         self.history += found.steps
-        self.rows = objective.rows
+        self.rows, self.multipliers = objective.rows, objective.multipliers
         self._stretch(found.x.duration)
         self.last = self.problem, found.x.path
         ended = self._at_its_duration(found, objective)
         self.points = []  # these are of other durations
+        if ended.why is Reason.STATIONARY:
+            self.unmet = spurious_sentence(self.problem, ended.x)
+            if not objective.satisfies_equations(found.x):
+                ended.why = Reason.DIVERGED
         if ended.why is Reason.STATIONARY and ended.saved:
             self._add_points(ended, objective.at(found.x.duration))
         return ended
 
     def solve_fixed(self, path: DiscretePath) -> Bounded:
         """Solve for the problem's duration, well enough for a motion that is to be stretched."""
-        rough = self.remaining_criteria().rough()
-        return self.minimized(self.objective(None), Start(path), rough)
+        known, rough = self.known_multipliers(path), self.remaining_criteria().rough()
+        objective = self.objective(known, tolerances=None if known is None else ROUGH_TOLERANCES)
+        ended = self.minimized(objective, Start(path), rough)
+        self.multipliers = objective.action.multipliers
+        return ended
 
     def back_to(self, problem: TrajectoryProblem) -> None:
         """See BoundedSearch: to the duration of the problem."""
@@ -133,6 +149,7 @@ def _searched(search: TimedSearch) -> Answer:
     if ended.why in STOPPED or not usable(ended):
         return _ended(search, ended.why)
     ended, reason, _ = tightened(search, ended)
+    reason = reason or search.unmet
     if not reason and ended.why is not Reason.STATIONARY:
         return _ended(search, ended.why)
     problem, x, n_neg = search.problem, ended.x, search.negative_eigenvalues(ended)

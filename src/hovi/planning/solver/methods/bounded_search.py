@@ -68,6 +68,8 @@ WARM_MU_RANGE = 1e-7, 1e-4
 """Range of the initial barrier parameter of a warm start, relative to the mean density."""
 LEVEL_MARGIN = 0.1
 """Distance of slacks from their bounds at a point of a central path, relative to its parameter."""
+EXACT_TOLERANCES, ROUGH_TOLERANCES = (TORQUE_TOLERANCE, NODE_TOLERANCE), (np.inf, 1e-4)
+"""Residuals of equations at the end of a solve and of a rough one: see BoundedAction."""
 LOOK_AROUND = 0.02
 """Distance beyond the least one up to which pairs near a known motion get rows, in [m]."""
 
@@ -294,8 +296,8 @@ class BoundedSearch:
 
     def _solved_under_equations(self, start: Begun) -> Bounded | None:
         """A solve whose steps satisfy the conditions at nodes; None where that fails."""
-        known = self.multipliers or first_multipliers(self.problem, start.x)
-        objective = self.objective(known, tolerances=(TORQUE_TOLERANCE, NODE_TOLERANCE))
+        known = self.known_multipliers(start.x)
+        objective = self.objective(known, tolerances=EXACT_TOLERANCES)
         ended = self.minimized(objective, start, self.remaining_criteria())
         satisfied = objective.satisfies_equations(ended.x)
         if ended.why is Reason.DIVERGED or (ended.why is Reason.STATIONARY and not satisfied):
@@ -304,6 +306,12 @@ class BoundedSearch:
         spurious = ended.why is Reason.STATIONARY
         self.unmet = spurious_sentence(self.problem, ended.x) if spurious else ""
         return ended
+
+    def known_multipliers(self, path: DiscretePath) -> Multipliers | None:
+        """Those of the constraints, the first ones at a path if none are known; None without."""
+        if not self.problem.constrained:
+            return None
+        return self.multipliers or first_multipliers(self.problem, path)
 
     def minimized(self, objective: BoundedAction, start: Begun, criteria: Criteria) -> Bounded:
         """One solve of an objective. start: see minimize_bounded."""

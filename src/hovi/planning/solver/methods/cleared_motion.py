@@ -18,7 +18,11 @@ from hovi.planning.solver.augmented_lagrangian_rounds import (
 )
 from hovi.planning.solver.central_path import CentralPath
 from hovi.planning.solver.limits.limit_rows import LimitRows
-from hovi.planning.solver.methods.bounded_search import Bounded, BoundedSearch
+from hovi.planning.solver.methods.bounded_search import (
+    ROUGH_TOLERANCES,
+    Bounded,
+    BoundedSearch,
+)
 from hovi.planning.solver.methods.method import Guess
 from hovi.planning.solver.methods.subproblems import Subproblem, joined, subproblems_of
 from hovi.planning.solver.multipliers import Multipliers
@@ -39,8 +43,6 @@ SECOND_STEPS, LEAST_SECOND_STEPS = 3, 20
 """The same for a second rough motion: per step of the first one, and at least."""
 ROUGH_VIOLATION = 0.05
 """Largest violation of a bound, relative to its range, from which a rough motion is solved on."""
-ROUGH_TOLERANCE = 1e-4
-"""Residual of conditions at nodes at which it ends, in [rad] or [m]."""
 ROUGH_ROUNDS = 3
 """Rounds of an augmented Lagrangian for a rough motion."""
 SUBPROBLEM_LEVEL = 3e-4
@@ -222,6 +224,6 @@ def _rough(
     criteria = search.remaining_criteria().rough()
     criteria = dataclasses.replace(criteria, max_iterations=min(most, criteria.max_iterations))
     steps = known is not None and len(search.problem.passive) == 0
-    objective = search.objective(known, tolerances=(np.inf, ROUGH_TOLERANCE) if steps else None)
+    objective = search.objective(known, tolerances=ROUGH_TOLERANCES if steps else None)
     start = Start(path) if mu is None else search.start_at(path, mu, objective)
     return search.minimized(objective, start, criteria), objective.action.multipliers
