@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 import time
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -24,11 +26,21 @@ SCENES: dict[str, tuple[float, dict[str, Any]]] = {
 BOUNDS = 0.5, 6.0
 GRIDS: dict[str, dict[str, Any]] = {"24 intervals": {"intervals": 24}, "to 0.1 %": {}}
 ROBOTS = {"ur5": 100.0, "panda": 50.0}
+KINDS = (
+    "to a configuration",
+    "to a frame",
+    "past a ball",
+    "clear of its links",
+    "a joint's power limited",
+)
+BALL, POWER = 0.05, 100.0
+"""Radius of the ball at the middle of the straight way in joint space, in [m], and power in [W]."""
 REACHES = 6
 RUNS = 3
 
 Row = list[float]
-"""T, steps and seconds with it free and given, |dS/dT + w| / w; and whether both succeeded."""
+"""T, steps and seconds with it free and given, |dS/dT + w| / w, 0 at a bound; and whether both
+succeeded."""
 
 
 def compare(ends: Sequence[Any], weight: float, options: dict[str, Any], runs: int = RUNS) -> Row:
@@ -36,18 +48,19 @@ def compare(ends: Sequence[Any], weight: float, options: dict[str, Any], runs: i
     free, seconds = timed(ends, BOUNDS, options | {"time_weight": weight}, runs)
     T = free.trajectory.duration
     fixed, given = timed(ends, T, options, runs)
-    slope = abs(free.duration_derivative / weight + 1)
+    inside = BOUNDS[0] < T < BOUNDS[1]
+    slope = abs(free.duration_derivative / weight + 1) if inside else 0.0
     return [T, free.nit, fixed.nit, seconds, given, slope, free.success and fixed.success]
 
 
 def timed(
-    ends: Sequence[Any], duration: Any, options: dict[str, Any], runs: int
+    ends: Sequence[Any], duration: Any, given: dict[str, Any], runs: int
 ) -> tuple[hovi.Solution, float]:
     """A plan and the least processor time of some runs, in [s]."""
-    times = []
+    times, options = [], {"self_collision": False} | given
     for _ in range(runs):
         began = time.process_time()
-        found = hovi.plan(*ends, duration, processes=1, self_collision=False, **options)
+        found = hovi.plan(*ends, duration, processes=1, **options)
         times.append(time.process_time() - began)
     return found, min(times)
 
@@ -63,8 +76,26 @@ def scene_row(name: str, grid: str) -> Row:
     return compare((scene, task.start, task.goal), weight, options)
 
 
-def random_rows(name: str) -> list[Row]:
-    """Reaches between random configurations, within the limits of the URDF."""
+def task_of(
+    kind: str, robot: hovi.Robot, q0: np.ndarray, q1: np.ndarray
+) -> tuple[Any, dict[str, Any]]:
+    """The goal and the options of a reach of a kind."""
+    position = partial(robot.frame_position, robot.tip_frames[0])
+    if kind == "to a frame":
+        return hovi.FrameGoal(robot.tip_frames[0], position=position(q1), guess=q1), {}
+    if kind == "past a ball":
+        ball = hovi.Sphere(position(0.5 * (q0 + q1)), BALL, name="ball")
+        return q1, {"obstacles": [ball]}
+    if kind == "clear of its links":
+        return q1, {"self_collision": True}
+    if kind == "a joint's power limited":
+        power = hovi.Condition(lambda tau, v: tau[1] * v[1], hovi.Between(-POWER, POWER))
+        return q1, {"conditions": [power]}
+    return q1, {}
+
+
+def random_rows(name: str, kind: str) -> list[Row]:
+    """Reaches of a kind between random configurations, within the limits of the URDF."""
     robot = hovi.load_robot(name)
     scene = hovi.Scene(robot, [Gravity()])
     lower = np.maximum(robot.model.lowerPositionLimit, -np.pi)
@@ -73,7 +104,8 @@ def random_rows(name: str) -> list[Row]:
     rows = []
     for _ in range(REACHES):
         q0, q1 = 0.8 * random.uniform(lower, upper), 0.8 * random.uniform(lower, upper)
-        rows.append(compare((scene, q0, q1), ROBOTS[name], {"intervals": 24}, 1))
+        goal, options = task_of(kind, robot, q0, q1)
+        rows.append(compare((scene, q0, goal), ROBOTS[name], {"intervals": 24} | options, 1))
     return rows
 
 
@@ -101,14 +133,15 @@ def main() -> None:
     print_table(["scene and grid", *columns], rows)
     print(f"{REACHES} random reaches within the limits of the URDF, 24 intervals.\n")
     rows = []
-    for name in ROBOTS:
-        found = np.array(alone(random_rows, name), dtype=float)
-        steps, times = found[:, 1] / found[:, 2], found[:, 3] / found[:, 4]
+    for name, kind in itertools.product(ROBOTS, KINDS):
+        found = np.array(alone(random_rows, name, kind), dtype=float)
+        done = found[found[:, 6] == 1.0]
+        steps, times = done[:, 1] / done[:, 2], done[:, 3] / done[:, 4]
         good = f"{int(found[:, 6].sum())} of {REACHES}"
         ratios = [f"{f(x):.1f}" for x in (steps, times) for f in (np.median, np.max)]
-        rows.append([f"`{name}`", good, *ratios, f"{found[:, 5].max():.0e}"])
+        rows.append([f"`{name}`, {kind}", good, *ratios, f"{done[:, 5].max():.0e}"])
     names = ["successes", "steps, median", "largest", "time, median", "largest"]
-    print_table(["robot", *names, "largest abs(dS/dT + w) / w"], rows)
+    print_table(["robot and task", *names, "largest abs(dS/dT + w) / w"], rows)
     print_machine()
 
 

@@ -923,7 +923,7 @@ _rule(
     "joint solve",
     "Motion and duration are solved for together where that is supported.",
     "joint_minimum",
-    "not solves_jointly(problem)",
+    "not solves_jointly(problem, near)",
     "True",
 )
 _rule(

@@ -38,13 +38,31 @@ def frame(scene: hovi.Scene, start: hovi.State, goal: hovi.State) -> tuple[Any, 
     return scene, start, aim
 
 
-TASKS: dict[str, tuple[Callable[[], tuple[Any, ...]], Any]] = {
-    "at rest": (lambda: (arm(), *REST), "none"),
-    "moving": (lambda: (arm(), *MOVING), "none"),
-    "six joints": (ur5, "none"),
-    "within limits": (lambda: (arm(), *MOVING), TORQUES),
-    "a frame within limits": (lambda: frame(arm(), *REST), TORQUES),
-    "a frame of six joints within limits": (lambda: frame(*ur5()), {"v": 0.8}),
+def past(scene: hovi.Scene, start: hovi.State, goal: hovi.State) -> list[hovi.Sphere]:
+    """A ball in the way of the tip."""
+    q = 0.5 * (np.asarray(start.q) + np.asarray(goal.q))
+    return [hovi.Sphere(scene.robot.frame_position(scene.robot.tip_frame, q), 0.05, name="ball")]
+
+
+BALANCE = hovi.Condition(lambda v: v[0] + v[1], hovi.Between(-3.0, 3.0), name="balance")
+POWER = hovi.Condition(lambda tau, v: tau[0] * v[0], hovi.Between(-10.0, 10.0), name="power")
+TASKS: dict[str, tuple[Callable[[], tuple[Any, ...]], dict[str, Any]]] = {
+    "at rest": (lambda: (arm(), *REST), {}),
+    "moving": (lambda: (arm(), *MOVING), {}),
+    "six joints": (ur5, {}),
+    "within limits": (lambda: (arm(), *MOVING), {"limits": TORQUES}),
+    "a frame within limits": (lambda: frame(arm(), *REST), {"limits": TORQUES}),
+    "a frame of six joints": (lambda: frame(*ur5()), {"limits": {"v": 0.8}}),
+    "past a ball": (ur5, {"limits": {"v": 0.8}, "obstacles": past(*ur5())}),
+    "a frame past a ball": (
+        lambda: frame(*ur5()),
+        {"limits": {"v": 0.8}, "obstacles": past(*ur5()), "self_collision": True},
+    ),
+    "under conditions": (lambda: (arm(), *MOVING), {"conditions": [BALANCE, POWER]}),
+    "under conditions within limits": (
+        lambda: (arm(), *REST),
+        {"conditions": [BALANCE, POWER], "limits": {"base": "none", "tau": [12.0, 5.0]}},
+    ),
 }
 
 
@@ -63,11 +81,12 @@ def around(found: hovi.Solution) -> Callable[[float], float]:
 
 @pytest.mark.parametrize("kind", TASKS)
 def test_the_best_duration_is_that_of_a_scalar_search_around_solves(kind: str) -> None:
-    ends, limits = TASKS[kind]
-    found = hovi.plan(*ends(), BOUNDS, time_weight=WEIGHT, limits=limits, **GRID)
+    ends, options = TASKS[kind]
+    given = GRID | {"limits": "none"} | options
+    found = hovi.plan(*ends(), BOUNDS, time_weight=WEIGHT, **given)
     assert found.success, found.message
     assert found.n_neg == 0
-    T, total, limited = found.trajectory.duration, around(found), limits != "none"
+    T, total, limited = found.trajectory.duration, around(found), bool(options)
     assert abs(found.duration_derivative + WEIGHT) <= (1e-7 if limited else 1e-10) * WEIGHT
     bracket = (0.95 * T, 1.01 * T, 1.1 * T) if limited else (0.99 * T, 1.001 * T, 1.01 * T)
     searched = minimize_scalar(total, bracket=bracket, options={"xtol": 1e-9, "maxiter": 20})

@@ -117,3 +117,14 @@ def test_what_has_times_of_its_own_is_refused() -> None:
         hovi.plan_sequence(scene, [0.0], segments, via=via)
     with pytest.raises(InputError, match="lower bound is below the upper one"):
         hovi.Segment([0.8], (3.0, 0.2))
+
+
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-4, 1e-5])
+def test_durations_are_free_on_a_grid_that_has_more_points(tolerance: float) -> None:
+    """The first motion is refined by more points, on as many intervals."""
+    scene = hovi.Scene(hovi.load_robot(hovi.example("two_link.urdf")), [hovi.effects.Gravity()])
+    segments = [hovi.Segment(q, (0.3, 2.0)) for q in ([0.5, 0.6], [1.0, -0.4])]
+    options = {"time_weight": 20.0, "tolerance": tolerance, "self_collision": False}
+    limits = {"base": "none", "v": 3.0}
+    found = hovi.plan_sequence(scene, [-0.5, 0.3], segments, limits=limits, **options)
+    assert found.success, found.message

@@ -305,7 +305,7 @@ def with_more_points(job: Job) -> Job:
 
 
 def on_grid_of(problem: TrajectoryProblem, solution: Solution) -> TrajectoryProblem:
-    """The problem on the solution's grid, whose intervals may have been split for limits."""
+    """The problem on the solution's grid: intervals may have been split, or have more points."""
     grid = solution.trajectory.grid
-    same = np.array_equal(grid.steps, problem.grid.steps)
+    same = np.array_equal(grid.steps, problem.grid.steps) and grid.schemes == problem.grid.schemes
     return problem if same else problem.on(grid)

@@ -67,7 +67,7 @@ def joint_minimum(
     None for a problem that does not support it, or if no minimum was found.
     near: whether the path nearly is a solution. Other arguments as of `solve_jointly`.
     """
-    if not solves_jointly(problem):
+    if not solves_jointly(problem, near):
         return None
     price = TimePrice(free.weight, free.lower, free.upper)
     found = solve_jointly(

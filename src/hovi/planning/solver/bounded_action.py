@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 import itertools
 from collections.abc import Callable, Iterator
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 import numpy.typing as npt
@@ -158,7 +160,7 @@ class BoundedAction(BoundedObjective[DiscretePath]):
         rows, J = self.rows, self._row_columns
         if rows is None or rows.size == 0:
             return None
-        here = slice(self._point_count, self._point_count + rows.size)
+        here = self.row_outputs
         slopes, curves = (self._row_weights * each[here] for each in (rho, sigma))
 
         def add(expansion: Expansion) -> None:
@@ -242,24 +244,32 @@ class BoundedAction(BoundedObjective[DiscretePath]):
 
     def push(self, step: Array, model: QuadraticModel) -> Array:
         """First-order change of the bounded outputs, shape (R,)."""
-        columns, expansion = model.gather(step), self.action.expansion
+        return self.pushed(model.gather(step))
+
+    def pushed(self, columns: Array) -> Array:
+        """The same for a step in the columns of the intervals, (N, m, n)."""
+        expansion = self.action.expansion
         if self.more is None and expansion.charts is None:
-            return self._pushed(columns)
+            return self._pushed_at_once(columns)
         changes = self.ld.point_steps(columns, self.action.coordinates, expansion)
         parts = []
         for dx, (_tau, J) in zip(changes, expansion.outputs, strict=True):
             dtau = np.matmul(J, dx[:, :, None])[:, :, 0]
             parts.append(np.concatenate([dx, dtau], axis=1))
-        changed = np.concatenate(parts)
+        dy = self.changes(np.concatenate(parts))
+        if self.rows is None or self.rows.size == 0:
+            return dy
+        return np.append(dy, push_rows(self.rows, self._row_columns, columns))
+
+    def changes(self, changed: Array) -> Array:
+        """First-order changes of the outputs at the points, flat, for those of all, (P, size)."""
         dy = changed[:, self.columns] * self._inverse_ranges
         if self.more is not None:
             dx = changed[:, : self._jacobian.shape[2], None]
             dy = np.concatenate([dy, np.matmul(self._jacobian, dx)[:, :, 0]], axis=1)
-        if self.rows is None or self.rows.size == 0:
-            return np.asarray(dy.ravel())
-        return np.append(dy, push_rows(self.rows, self._row_columns, columns))
+        return np.asarray(dy.ravel())
 
-    def _pushed(self, columns: Array) -> Array:
+    def _pushed_at_once(self, columns: Array) -> Array:
         """The change at the points, then of the rows, (R,), compiled."""
         rows, count = self.rows, self._point_count
         out = np.empty(count + (0 if rows is None else rows.size))
@@ -314,7 +324,11 @@ class BoundedAction(BoundedObjective[DiscretePath]):
 
     def accept(self, step: Array, model: QuadraticModel) -> None:
         """Use the torques that the step predicts as weights of the next model's curvature."""
-        self._predicted = self.action.predicted_slopes(model.gather(step))
+        self.predict(self.action.predicted_slopes(model.gather(step)))
+
+    def predict(self, slopes: list[Array]) -> None:
+        """Take `output_slope` of predicted outputs, per batch; those of the path if empty."""
+        self._predicted = slopes or None
 
     def hold(self, x: DiscretePath, change: Array) -> float:
         """See BoundedObjective.hold."""
@@ -341,6 +355,44 @@ class BoundedAction(BoundedObjective[DiscretePath]):
     def retract(self, x: DiscretePath, step: Array, model: QuadraticModel) -> DiscretePath:
         """The path moved by a step."""
         return self.action.retract(x, step, model)
+
+    def stretched(self, problem: TrajectoryProblem) -> Self:
+        """The same for the problem of another duration, before the first model.
+
+        Bounds and the columns of the Hessian's pattern stay, weights grow with the duration.
+        """
+        ratio = problem.grid.duration / self.problem.grid.duration
+        other = copy.copy(self)
+        other.problem, own = problem, self.action
+        other.action = ActionObjective(
+            problem, own.algebra, multipliers=own.multipliers, keep_points=own.keep_points
+        )
+        other.ld, other.lagrangian = other.action.ld, other.action.lagrangian
+        lower, upper, weights = self._at_points
+        other._at_points = lower, upper, ratio * weights
+        other._predicted = None
+        if self.rows is not None:
+            other.rows = self.rows.stretched(problem.grid)
+            other._row_weights = other.rows.weights
+            other._row_columns = other.rows.columns(own.coordinates)
+        measure = problem.grid.duration
+        weights = ratio * self.bounds.weights
+        other.bounds = dataclasses.replace(self.bounds, weights=weights, measure=measure)
+        return other
+
+    def plain(self, ordered: Array) -> Array:
+        """Values of outputs at the points, then of rows of limits, then of distances."""
+        return ordered
+
+    def ordered(self, plain: Array) -> Array:
+        """Such values in the order of the outputs."""
+        return plain
+
+    @property
+    def row_outputs(self) -> slice:
+        """Where rows of limits are among plain outputs."""
+        first = self._point_count
+        return slice(first, first + (0 if self.rows is None else self.rows.size))
 
     def _of_points(self, values: Array) -> Array:
         """The values of the outputs at the points, (P, K)."""

@@ -12,7 +12,7 @@ from hovi.optimize.ended import Ended, Reason
 from hovi.optimize.start import Start
 from hovi.optimize.trust_region import minimize
 from hovi.planning.problem.contradictions import contradiction
-from hovi.planning.problem.limits import Limits
+from hovi.planning.problem.limits import Limits, no_limits
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.problem.tolerance import LAST_BARRIER
 from hovi.planning.solver.action_objective import MAX_BAND_INTERVALS
@@ -20,6 +20,7 @@ from hovi.planning.solver.answer import Answer
 from hovi.planning.solver.free_duration.timed_action import TimedAction
 from hovi.planning.solver.free_duration.timed_path import TimedPath, TimePrice, stretched_path
 from hovi.planning.solver.free_duration.timed_search import minimum_within_limits
+from hovi.planning.solver.methods.interior_point import takes_rows
 from hovi.planning.solver.methods.method import Guess
 from hovi.planning.solver.outcome.cost_with_time import price_of_time
 from hovi.planning.solver.solver import STATIONARY_DECREASE, Solution, solution_of
@@ -29,23 +30,27 @@ from hovi.system.deadline import OutOfTimeError
 from hovi.system.interruption import interruptible
 
 
-def solves_jointly(problem: TrajectoryProblem) -> bool:
+def solves_jointly(problem: TrajectoryProblem, near: bool) -> bool:
     """Whether the duration can be an unknown of a problem's motion.
 
-    Not with conditions or obstacles, on which more depends than the discrete Lagrangian and the
-    limits at the points; not with equations, but for those of configurations at nodes within
-    limits; not with limits on the torque rate, which are imposed after a first solve; not from a
-    start outside its limits, whose way back takes a time of its own; nor on grids of so many
-    intervals that they need the merge tree.
+    Not with conditions, on which more depends than the discrete Lagrangian and the limits at the
+    points; not with equations, but for those of configurations at nodes within limits; not with
+    limits on the torque rate, which are imposed after a first solve; not from a start outside its
+    limits, whose way back takes a time of its own; nor on grids of so many intervals that they need
+    the merge tree. Among obstacles that rest, near a motion that keeps its distances.
+    near: whether a guess nearly is a solution.
     """
-    simple = not (problem.periodic or problem.via or problem.bounds or len(problem.passive) > 0)
+    simple = not (problem.periodic or problem.via or len(problem.passive) > 0)
     of_motion = any(each.y.needs - {"q"} for each in problem.equations)
-    simple = simple and not of_motion and (problem.limited or not problem.equations)
+    simple = simple and not of_motion and (not problem.equations or (near and problem.limited))
     timed = problem.ld.lagrangian.timed or problem.ld.segments is not None
+    timed = timed or any(each.timed for each in problem.bounds)
     limits = problem.limits
     rates = limits is not None and (limits.on_torque_rate or bool(limits.excused))
     small = problem.grid.intervals <= MAX_BAND_INTERVALS
-    return simple and not timed and small and not rates and problem.distances is None
+    distances = problem.distances
+    clear = distances is None or (near and takes_rows(problem) and not distances.paths)
+    return simple and not timed and small and not rates and clear
 
 
 @one_blas_thread
@@ -80,8 +85,9 @@ def solve_jointly(
         exact=True,
         barrier=barrier,
     )
-    if problem.limited and problem.limits is not None:
-        result = _limited(first, problem.limits, Start(guess, near=near), price, criteria)
+    if problem.limited:
+        limits = problem.limits or no_limits(problem.coordinates)
+        result = _limited(first, limits, Start(guess, near=near), price, criteria)
     else:
         result = _unlimited(first, guess, price, criteria)
     return solution_of(result, 0.0, time.perf_counter() - began)

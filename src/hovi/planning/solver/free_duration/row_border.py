@@ -11,48 +11,38 @@ import numpy.typing as npt
 
 from hovi._native import intervals as native
 from hovi.planning.solver.free_duration.duration_border import DurationBorder
-from hovi.planning.solver.limits.limit_rows import LimitRows, push_rows
+from hovi.planning.solver.limits.limit_rows import LimitRows
 from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class RowMap:
-    """Rows at a path: their derivatives in the columns, shape (E, m), and their values y, (E,)."""
+class RowForces:
+    """Rows at a path, with what acts on them: see the interior point.
+
+    columns: their derivatives in the columns, shape (E, m). values: y, (E,).
+    sigma, rho, multipliers: weighted, (E,) each.
+    """
 
     rows: LimitRows
     columns: Array
     values: Array
+    sigma: Array
+    rho: Array
+    multipliers: Array
 
     @property
     def slopes(self) -> Array:
         """dy/ds with the columns fixed, shape (E,)."""
         return np.asarray(-self.rows.orders * self.values)
 
-    def steps(self, columns: Array, change: float) -> Array:
-        """First-order change of y in a step of the columns and a change of log T, (E,)."""
-        return push_rows(self.rows, self.columns, columns) + change * self.slopes
-
-
-@dataclass(frozen=True, eq=False)
-class RowForces:
-    """Weighted sigma, rho and multipliers of rows, (E,) each: see the interior point.
-
-    at: the rows at a path.
-    """
-
-    at: RowMap
-    sigma: Array
-    rho: Array
-    multipliers: Array
-
     def added_to(self, border: DurationBorder) -> DurationBorder:
         """The border with the terms of the rows, whose weights do not grow with T."""
-        rows, slopes, j = self.at.rows, self.at.slopes, self.at.rows.orders
+        rows, slopes, j = self.rows, self.slopes, self.rows.orders
         column = border.column.copy()
         forces = self.sigma * slopes - j * self.multipliers
-        native.pull_rows(rows.intervals, rows.joints, self.at.columns, forces, column)
-        bend = self.sigma * slopes**2 + self.multipliers * j**2 * self.at.values
+        native.pull_rows(rows.intervals, rows.joints, self.columns, forces, column)
+        bend = self.sigma * slopes**2 + self.multipliers * j**2 * self.values
         slope = border.slope + float(self.rho @ slopes)
         return DurationBorder(slope, column, border.corner + float(bend.sum()))

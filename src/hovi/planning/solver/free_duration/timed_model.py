@@ -53,7 +53,6 @@ class TimedModel(BorderedModel):
         assert isinstance(inner, BandModel | EquationModel)
         self.action = action
         self.x = x
-        self.rows = rows
         self.expansion = action.expansion
         self.jets = action.jets(x.path)
         problem = action.problem
@@ -81,14 +80,6 @@ class TimedModel(BorderedModel):
             columns += t * self.ends
         changes = self.action.ld.point_steps(columns, "nodal", self.expansion)
         return [dx + t * stretch_of(jet) for dx, jet in zip(changes, self.jets, strict=True)]
-
-    def row_steps(self, step: Array) -> Array:
-        """First-order change of the limited quantities between the points, (E,)."""
-        assert self.rows is not None
-        t, columns = float(step[-1]), self.gather(step)
-        if self.ends is not None:
-            columns = columns + t * self.ends
-        return self.rows.at.steps(columns, t)
 
     def predicted_slopes(self, step: Array) -> list[Array]:
         """`output_slope` of the outputs that a step predicts, per batch."""

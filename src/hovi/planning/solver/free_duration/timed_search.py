@@ -30,8 +30,10 @@ from hovi.planning.solver.methods.bounded_search import (
     BoundedSearch,
 )
 from hovi.planning.solver.methods.feasibility import solved_from
+from hovi.planning.solver.methods.interior_point import takes_rows
 from hovi.planning.solver.methods.limits_between_points import tightened, usable
 from hovi.planning.solver.methods.method import Guess
+from hovi.planning.solver.near.cleared_action import ClearedAction
 from hovi.planning.solver.outcome.cost_with_time import cost_of
 from hovi.planning.solver.status import Status, unfinished
 from hovi.system.dataclass import dataclass
@@ -50,7 +52,8 @@ def minimum_within_limits(
     criteria: Criteria,
 ) -> Answer:
     """A motion and a duration of least S + w T within limits, from a guess for the problem's."""
-    search = TimedSearch(problem, limits, criteria, None, start, price=price)
+    lazy = takes_rows(problem)
+    search = TimedSearch(problem, limits, criteria, None, start, lazy=lazy, price=price)
     return answered(partial(_searched, search), partial(_ended, search))
 
 
@@ -69,14 +72,17 @@ class TimedSearch(BoundedSearch):
         raise_if_late()
         problem, criteria = self.problem, self.remaining_criteria()
         criteria = dataclasses.replace(criteria, decrease=LAST_DECREASE, plain=False)
-        common = problem, self.limits, self.margins, self.price, self.rows
         known = self.known_multipliers(start.x)
-        objective = TimedBoundedAction(*common, known, None if known is None else EXACT_TOLERANCES)
+        first = self.objective(known, "band", None if known is None else EXACT_TOLERANCES)
+        objective = TimedBoundedAction(first, self.price)
         x = TimedPath(start.x, problem.grid.duration)
         found = minimize_bounded(objective, Start(x, start.z), criteria, self.report)
         self.iterations += len(found.steps)
         self.history += found.steps
-        self.rows, self.multipliers = objective.rows, objective.multipliers
+        first = objective.first
+        self.rows, self.multipliers = first.rows or self.rows, first.action.multipliers
+        if isinstance(first, ClearedAction):
+            self.near = first.near
         self._stretch(found.x.duration)
         self.last = self.problem, found.x.path
         ended = self._at_its_duration(found, objective)
@@ -107,6 +113,7 @@ class TimedSearch(BoundedSearch):
         if duration != before:
             self.problem = self.problem.on(self.problem.grid.stretched(duration))
             self.rows = self.rows.on(self.problem.grid)
+            self.near = self.near and self.near.on(self.problem, self.rows)
             self.guess = self.problem.moved(stretched_path(self.guess, duration / before))
 
     def _at_its_duration(
@@ -149,7 +156,7 @@ def _searched(search: TimedSearch) -> Answer:
     if ended.why in STOPPED or not usable(ended):
         return _ended(search, ended.why)
     ended, reason, _ = tightened(search, ended)
-    reason = reason or search.unmet
+    reason = reason or search.unmet or search.too_close(ended.x)
     if not reason and ended.why is not Reason.STATIONARY:
         return _ended(search, ended.why)
     problem, x, n_neg = search.problem, ended.x, search.negative_eigenvalues(ended)

@@ -88,10 +88,13 @@ class ClearanceRows:
         rows.fixed, rows._normals = fixed, self._normals.copy()
         return rows
 
-    def on(self, problem: TrajectoryProblem) -> ClearanceRows:
-        """The same rows of another problem, on as many intervals."""
+    def on(self, problem: TrajectoryProblem, behind: LimitRows | None = None) -> ClearanceRows:
+        """The same rows of another problem, on as many intervals.
+
+        behind: rows of limits that take the place of those that these are behind, in this order.
+        """
         rows = copy.copy(self)
-        rows._followed = None
+        rows._followed = behind
         rows._set(problem, self.intervals, self.positions, self.pairs, self.rounding)
         rows._normals = self._normals.copy()
         return rows

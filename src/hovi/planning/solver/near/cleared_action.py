@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Self
 
 import numpy as np
 import numpy.typing as npt
@@ -73,7 +74,7 @@ class ClearedAction(BoundedAction):
         if near.size == 0:
             return
         lower, upper, weights = (
-            self._ordered(np.append(base, more))
+            self.ordered(np.append(base, more))
             for base, more in (
                 (bounds.lower, np.zeros(near.size)),
                 (bounds.upper, np.full(near.size, np.inf)),
@@ -88,7 +89,7 @@ class ClearedAction(BoundedAction):
         if self.near.size == 0 and not self.near.watchful:
             return base
         value = np.inf if self.near.hidden_depth(x) > DEEPEST else base.value
-        return Outputs(value, self._ordered(np.append(base.y, self.near.values(x))))
+        return Outputs(value, self.ordered(np.append(base.y, self.near.values(x))))
 
     def _bounded_outputs(self, x: DiscretePath, outputs: list[Array]) -> Array:
         """Those without distances, which are kept for the last paths."""
@@ -140,12 +141,12 @@ class ClearedAction(BoundedAction):
 
         return add
 
-    def push(self, step: Array, model: QuadraticModel) -> Array:
-        """See BoundedAction.push."""
-        dy = super().push(step, model)
+    def pushed(self, columns: Array) -> Array:
+        """See BoundedAction.pushed."""
+        dy = super().pushed(columns)
         if self._near is None:
             return dy
-        return self._ordered(np.append(dy, self._near.push(model.gather(step))))
+        return self.ordered(np.append(dy, self._near.push(columns)))
 
     def pull(self, forces: Array, model: QuadraticModel) -> Array:
         """See BoundedAction.pull."""
@@ -190,6 +191,13 @@ class ClearedAction(BoundedAction):
         none = np.zeros(0, dtype=np.intp)
         return self._renumbered(order, before, np.arange(before), none, added)
 
+    def stretched(self, problem: TrajectoryProblem) -> Self:
+        """See BoundedAction.stretched: rows of distances stay where they are on their intervals."""
+        other = super().stretched(problem)
+        other.near, other._near = self.near.on(problem, other.rows), None
+        other._limit_outputs = RecentPaths()
+        return other
+
     def _renumbered(
         self, order: Index, before: int, kept: Index, origin: Index, added: int
     ) -> Refinement:
@@ -230,15 +238,15 @@ class ClearedAction(BoundedAction):
         """The number of outputs that are no distances."""
         return self._point_count + (0 if self.rows is None else self.rows.size)
 
-    def _ordered(self, plain: Array) -> Array:
-        """Outputs in their order, from those at the points, of limits and of distances."""
+    def ordered(self, plain: Array) -> Array:
+        """See BoundedAction.ordered."""
         first = self._point_count
         if self.near.size == 0:
             return plain
         return np.append(plain[:first], plain[first:][self.near.order])
 
     def plain(self, ordered: Array) -> Array:
-        """Values of outputs at the points, then of rows of limits, then of distances."""
+        """See BoundedAction.plain."""
         if self.near.size == 0:  # rows of limits alone are in their order
             return ordered
         first, plain = self._point_count, np.empty_like(ordered)
