@@ -327,6 +327,13 @@ _problem("duration panda")(
 _problem("duration by frame")(
     _frame("ur5", 1, duration=(0.8, 4.0), time_weight=50.0, guess_at_goal=True)
 )
+_problem("duration by frame without limits")(
+    _frame("ur5", 1, duration=(0.8, 4.0), time_weight=50.0, guess_at_goal=True, limits="none")
+)
+_problem("duration past balls")(_cell("ur5", 4, 2, duration=(0.5, 4.0), time_weight=50.0))
+_problem("duration past balls and clear of links")(
+    _cell("ur5", 1, 2, duration=(0.5, 4.0), time_weight=50.0, self_collision=True)
+)
 _problem("duration too short at first")(
     _between("ur5", 6, 0.8, (0.02, 3.0), time_weight=50.0, self_collision=False)
 )

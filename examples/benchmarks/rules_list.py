@@ -630,6 +630,13 @@ _rule(
     "along.rows is None",
     "False",
 )
+_rule(
+    "refine rows near a solution",
+    "From a motion that nearly is a solution control points are halved before the first step.",
+    "solved_from",
+    "search.rows.refine(path, NEARBY_MU)",
+    "None",
+)
 _at("warm starts", "planning.solver.warm_start")
 _rule(
     "predict the replanned motion",

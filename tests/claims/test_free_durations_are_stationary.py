@@ -52,6 +52,7 @@ TASKS: dict[str, tuple[Callable[[], tuple[Any, ...]], dict[str, Any]]] = {
     "six joints": (ur5, {}),
     "within limits": (lambda: (arm(), *MOVING), {"limits": TORQUES}),
     "a frame within limits": (lambda: frame(arm(), *REST), {"limits": TORQUES}),
+    "a frame without limits": (lambda: frame(*ur5()), {"limits": "none"}),
     "a frame of six joints": (lambda: frame(*ur5()), {"limits": {"v": 0.8}}),
     "past a ball": (ur5, {"limits": {"v": 0.8}, "obstacles": past(*ur5())}),
     "a frame past a ball": (
@@ -96,6 +97,21 @@ def test_the_best_duration_is_that_of_a_scalar_search_around_solves(kind: str) -
         h, stencil = 3e-3 * T, {1: 45 / 60, 2: -9 / 60, 3: 1 / 60}
         slope = sum(c * (total(T + k * h) - total(T - k * h)) for k, c in stencil.items()) / h
         assert abs(slope) <= 1e-7 * WEIGHT
+
+
+@pytest.mark.parametrize("to", ["a configuration", "a frame"])
+@pytest.mark.parametrize("weight", [1e3, 1e6])
+def test_a_large_price_of_time_makes_motions_no_less_accurate(to: str, weight: float) -> None:
+    """The cost without time is that of a plan for the duration that was found, a bound."""
+    ends = frame(*ur5()) if to == "a frame" else ur5()
+    given = GRID | {"limits": {"v": 0.8}}
+    found = hovi.plan(*ends, (4.0, 6.0), time_weight=weight, **given)
+    assert found.success, found.message
+    T = found.trajectory.duration
+    assert pytest.approx(4.0, rel=1e-12) == T
+    alone = hovi.plan(*ends, 4.0, guess=found.trajectory, **given)
+    assert alone.success, alone.message
+    assert found.cost - weight * T == pytest.approx(alone.cost, rel=1e-4)
 
 
 def glide(bounds: tuple[float, float], **options: Any) -> hovi.Solution:

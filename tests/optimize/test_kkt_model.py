@@ -260,9 +260,11 @@ def test_curvature_across_equations_alone_needs_to_be_positive() -> None:
         assert (steps.factor(0.0) is not None) == (tangent == 0)
 
 
-def bordered(corner: float, room: tuple[float, float]) -> tuple[BorderedModel, Array, Array]:
+def bordered(
+    corner: float, room: tuple[float, float], curvature: float = 0.0
+) -> tuple[BorderedModel, Array, Array]:
     """A model under equations with one more unknown, its dense Hessian with that, and A."""
-    inner, H, A = under_equations()
+    inner, H, A = under_equations(curvature=curvature)
     column = np.random.default_rng(4).standard_normal(len(H))
     whole = np.block([[H, column[:, None]], [column, corner]])
     model = BorderedModel(inner, Border(-1.5, column, corner, 3.0, room))
@@ -281,6 +283,9 @@ def test_newton_steps_with_one_more_unknown_solve_its_kkt_system(room: tuple[flo
     assert room[0] <= step[-1] <= room[1]
     free = np.ones(len(H), dtype=bool)
     free[-1] = abs(step[-1]) < room[1]
+    outward = (softened[-1] @ step + gradient[-1]) * step[-1]
+    assert free[-1] == (room[1] > 1)
+    assert free[-1] or outward < 0
     expected = step.copy()
     rest = gradient[free] + softened[np.ix_(free, ~free)] @ step[~free]
     expected[free] = np.linalg.solve(softened[np.ix_(free, free)], -rest)
@@ -293,10 +298,14 @@ def test_newton_steps_with_one_more_unknown_solve_its_kkt_system(room: tuple[flo
     assert product == pytest.approx(z @ residual, rel=1e-9)
 
 
-@pytest.mark.parametrize("corner", [-5.0, 0.02, 50.0])
-def test_the_inertia_with_one_more_unknown_is_that_of_the_tangent_space(corner: float) -> None:
-    model, H, A = bordered(corner, (-9.0, 9.0))
-    Z = scipy.linalg.null_space(A)
-    negative = int(np.sum(np.linalg.eigvalsh(Z.T @ H @ Z) < 0))
-    assert model.negative_eigenvalues() == negative
-    assert (model.factor(0.0) is None) == (negative > 0)
+def test_the_inertia_with_one_more_unknown_is_that_of_the_tangent_space() -> None:
+    counts = set()
+    for curvature in (0.0, -3.0, -6.0, -12.0):
+        for corner in (-5.0, 0.02, 50.0):
+            model, H, A = bordered(corner, (-9.0, 9.0), curvature)
+            Z = scipy.linalg.null_space(A)
+            negative = int(np.sum(np.linalg.eigvalsh(Z.T @ H @ Z) < 0))
+            assert model.negative_eigenvalues() == negative
+            assert (model.factor(0.0) is None) == (negative > 0)
+            counts.add(negative)
+    assert len(counts) > 3

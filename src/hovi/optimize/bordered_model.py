@@ -90,8 +90,7 @@ class BorderedModel(QuadraticModel):
         pivot = border.corner + shift * border.metric - float(border.column @ solved)
         if pivot > 0:
             return BorderedFactor(inner, border.column, solved, pivot)
-        # the slope of the cost in t, all else at its minimum for every t
-        slope = border.slope + float(border.column @ self.inner.descend(inner)[0])
+        slope = self._slope_at(self.inner.descend(inner)[0])
         low, high = border.room
         kept = (low == 0 and slope > 0) or (high == 0 and slope < 0)
         return BorderedFactor(inner, border.column, solved, None) if kept else None
@@ -105,7 +104,7 @@ class BorderedModel(QuadraticModel):
         assert isinstance(factor, BorderedFactor)
         x, slope, _ = self.inner.descend(factor.inner)
         t = multiplier = 0.0
-        rate = self.border.slope + float(self.border.column @ x)  # with all else at its minimum
+        rate = self._slope_at(x)
         if factor.pivot is not None:
             free = -rate / factor.pivot
             t = float(np.clip(free, *self.border.room))
@@ -113,10 +112,14 @@ class BorderedModel(QuadraticModel):
         s = np.append(x - t * factor.solved, t)
         return s, slope + (rate + multiplier) * t, float(s @ self.metric_product(s))
 
+    def _slope_at(self, x: Array) -> float:
+        """The slope in t where all else is at its minimum x for t = 0: g_t + b.x."""
+        return self.border.slope + float(self.border.column @ x)
+
     def reaction(
         self, gradient: Array, s: Array, factor: Factor | None
     ) -> tuple[Array, float] | None:
-        """That of the inner model, for the gradient that the last unknown leaves it."""
+        """That of the inner model for the gradient g + t b, with the step t."""
         if not isinstance(factor, BorderedFactor):
             return None
         return self.inner.reaction(gradient[:-1] + s[-1] * self.border.column, s[:-1], factor.inner)

@@ -351,10 +351,10 @@ class KktModel:
 
         Those of the KKT matrix less the number of equations: see [Gould1985]. Two values of delta
         have to agree.
-        border: a further row b of H and its diagonal entry c, of an unknown that no equation has.
+        border: a further row b of H and its diagonal entry c, of an unknown that is in no equation.
         """
         factors = [self._without_delta(0.0, d * DELTA) for d in (1.0, 1e-2)]
-        counts = {factor.negative + _beyond(factor, border) for factor in factors}
+        counts = {factor.negative + _negative_pivot(factor, border) for factor in factors}
         return -1 if len(counts) > 1 else max(counts.pop() - self.equations, -1)
 
     def jacobian_product(self, s: Array) -> Array:
@@ -393,8 +393,11 @@ class KktModel:
         return self.normal_factor(1.0).solve(-self.gradient, np.zeros(self.equations))[1]
 
 
-def _beyond(factor: KktFactor, border: tuple[Array, float] | None) -> int:
-    """Number of negative eigenvalues that a further row adds: see Haynsworth's inertia."""
+def _negative_pivot(factor: KktFactor, border: tuple[Array, float] | None) -> int:
+    """1 if the pivot c - b.H^-1 b of a border is negative, else 0: Haynsworth's additivity.
+
+    H^-1 b under the equations.
+    """
     if border is None or factor.negative < 0:
         return 0
     column, corner = border

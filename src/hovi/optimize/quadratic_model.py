@@ -71,7 +71,7 @@ class QuadraticModel(ABC):
     def reaction(
         self, gradient: Array, s: Array, factor: Factor | None
     ) -> tuple[Array, float] | None:
-        """Multipliers of equations of the step s for a gradient, and z c for the residual c.
+        """Multipliers z of equations after a step s for a gradient, and z.c with the residual c.
 
         None for a step, or a model, without equations.
         """

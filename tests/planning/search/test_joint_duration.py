@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import pytest
 
 import hovi
@@ -207,3 +208,39 @@ def test_too_few_steps_are_no_success(most: int) -> None:
         assert found.minima == ()
     else:
         assert found.duration_derivative == pytest.approx(-20.0, rel=1e-6)
+
+
+def the_tip(scene: hovi.Scene, q: npt.ArrayLike) -> npt.NDArray[np.float64]:
+    return scene.robot.frame_position(scene.robot.tip_frames[0], np.asarray(q))
+
+
+WAY = np.array([1.0, 0.3, -0.4, 0.2, 0.3, 0.1])
+KINDS = {
+    "a frame": lambda scene, q0, q1: (
+        hovi.FrameGoal(scene.robot.tip_frames[0], position=the_tip(scene, q1), guess=q1),
+        {},
+    ),
+    "a ball": lambda scene, q0, q1: (
+        q1,
+        {"obstacles": [hovi.Sphere(the_tip(scene, 0.5 * (q0 + q1)), 0.05, name="ball")]},
+    ),
+    "its links": lambda scene, q0, q1: (q1, {"self_collision": True}),
+    "a condition": lambda scene, q0, q1: (
+        q1,
+        {"conditions": [hovi.Condition(lambda v: v[0] + v[1], hovi.Between(-1.0, 1.0))]},
+    ),
+}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_free_duration_takes_a_few_times_the_steps_of_a_given_one(kind: str) -> None:
+    """A search around solves takes ten times as many."""
+    scene = hovi.Scene(hovi.load_robot("ur5"), [hovi.effects.Gravity()])
+    q0 = np.array([0.0, -1.4, 1.6, -0.2, 0.5, 0.0])
+    goal, options = KINDS[kind](scene, q0, q0 + WAY)
+    given = {"intervals": 20, "self_collision": False} | options
+    free = hovi.plan(scene, q0, goal, (0.4, 5.0), time_weight=50.0, **given)
+    fixed = hovi.plan(scene, q0, goal, free.trajectory.duration, **given)
+    assert free.success, free.message
+    assert fixed.success, fixed.message
+    assert free.nit <= 5 * fixed.nit

@@ -244,32 +244,35 @@ class BoundedAction(BoundedObjective[DiscretePath]):
 
     def push(self, step: Array, model: QuadraticModel) -> Array:
         """First-order change of the bounded outputs, shape (R,)."""
-        return self.pushed(model.gather(step))
+        return self.push_columns(model.gather(step))
 
-    def pushed(self, columns: Array) -> Array:
+    def push_columns(self, columns: Array) -> Array:
         """The same for a step in the columns of the intervals, (N, m, n)."""
         expansion = self.action.expansion
         if self.more is None and expansion.charts is None:
-            return self._pushed_at_once(columns)
-        changes = self.ld.point_steps(columns, self.action.coordinates, expansion)
-        parts = []
-        for dx, (_tau, J) in zip(changes, expansion.outputs, strict=True):
-            dtau = np.matmul(J, dx[:, :, None])[:, :, 0]
-            parts.append(np.concatenate([dx, dtau], axis=1))
-        dy = self.changes(np.concatenate(parts))
+            return self._push_compiled(columns)
+        dy = self.push_jets(self.ld.point_steps(columns, self.action.coordinates, expansion))
         if self.rows is None or self.rows.size == 0:
             return dy
         return np.append(dy, push_rows(self.rows, self._row_columns, columns))
 
-    def changes(self, changed: Array) -> Array:
-        """First-order changes of the outputs at the points, flat, for those of all, (P, size)."""
+    def push_jets(self, changes: list[Array]) -> Array:
+        """That of the outputs at the points, flat, for a change of the jets there.
+
+        changes: shape (P, (k + 1) nv) per batch.
+        """
+        parts = []
+        for dx, (_tau, J) in zip(changes, self.action.expansion.outputs, strict=True):
+            dtau = np.matmul(J, dx[:, :, None])[:, :, 0]
+            parts.append(np.concatenate([dx, dtau], axis=1))
+        changed = np.concatenate(parts)
         dy = changed[:, self.columns] * self._inverse_ranges
         if self.more is not None:
             dx = changed[:, : self._jacobian.shape[2], None]
             dy = np.concatenate([dy, np.matmul(self._jacobian, dx)[:, :, 0]], axis=1)
         return np.asarray(dy.ravel())
 
-    def _pushed_at_once(self, columns: Array) -> Array:
+    def _push_compiled(self, columns: Array) -> Array:
         """The change at the points, then of the rows, (R,), compiled."""
         rows, count = self.rows, self._point_count
         out = np.empty(count + (0 if rows is None else rows.size))
@@ -307,8 +310,7 @@ class BoundedAction(BoundedObjective[DiscretePath]):
             local[:, : pulled.shape[1]] += own
         rows = self.rows
         if rows is not None and rows.size > 0:
-            first = self._point_count
-            weighted = self._row_weights * forces[first : first + rows.size]
+            weighted = self._row_weights * forces[self.row_outputs]
             native.pull_rows(rows.intervals, rows.joints, self._row_columns, weighted, local)
         return model.scatter(local)
 
@@ -357,11 +359,12 @@ class BoundedAction(BoundedObjective[DiscretePath]):
         return self.action.retract(x, step, model)
 
     def stretched(self, problem: TrajectoryProblem) -> Self:
-        """The same for the problem of another duration, before the first model.
+        """The same bounded action for another duration of its problem, without a model yet.
 
-        Bounds and the columns of the Hessian's pattern stay, weights grow with the duration.
+        Bounds and the pattern of the Hessian stay; weights are proportional to the duration T.
         """
-        ratio = problem.grid.duration / self.problem.grid.duration
+        T = problem.grid.duration
+        ratio = T / self.problem.grid.duration
         other = copy.copy(self)
         other.problem, own = problem, self.action
         other.action = ActionObjective(
@@ -375,9 +378,8 @@ class BoundedAction(BoundedObjective[DiscretePath]):
             other.rows = self.rows.stretched(problem.grid)
             other._row_weights = other.rows.weights
             other._row_columns = other.rows.columns(own.coordinates)
-        measure = problem.grid.duration
         weights = ratio * self.bounds.weights
-        other.bounds = dataclasses.replace(self.bounds, weights=weights, measure=measure)
+        other.bounds = dataclasses.replace(self.bounds, weights=weights, measure=T)
         return other
 
     def plain(self, ordered: Array) -> Array:

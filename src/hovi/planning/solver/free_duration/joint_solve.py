@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+import math
 import time
 
 import numpy as np
@@ -20,37 +22,41 @@ from hovi.planning.solver.answer import Answer
 from hovi.planning.solver.free_duration.timed_action import TimedAction
 from hovi.planning.solver.free_duration.timed_path import TimedPath, TimePrice, stretched_path
 from hovi.planning.solver.free_duration.timed_search import minimum_within_limits
-from hovi.planning.solver.methods.interior_point import takes_rows
+from hovi.planning.solver.methods.interior_point import InteriorPoint, takes_rows
 from hovi.planning.solver.methods.method import Guess
 from hovi.planning.solver.outcome.cost_with_time import price_of_time
 from hovi.planning.solver.solver import STATIONARY_DECREASE, Solution, solution_of
 from hovi.planning.solver.status import Status, chart_sentence, status_of
 from hovi.system.blas_threads import one_blas_thread
-from hovi.system.deadline import OutOfTimeError
+from hovi.system.deadline import Deadline, OutOfTimeError
 from hovi.system.interruption import interruptible
 
 
 def solves_jointly(problem: TrajectoryProblem, near: bool) -> bool:
     """Whether the duration can be an unknown of a problem's motion.
 
-    Not with conditions, on which more depends than the discrete Lagrangian and the limits at the
-    points; not with equations, but for those of configurations at nodes within limits; not with
-    limits on the torque rate, which are imposed after a first solve; not from a start outside its
-    limits, whose way back takes a time of its own; nor on grids of so many intervals that they need
-    the merge tree. Among obstacles that rest, near a motion that keeps its distances.
-    near: whether a guess nearly is a solution.
+    Where more depends on it than the action and the limits, it cannot: functions of time, obstacles
+    that move, via points, segments and equations with times of their own, passive torques, and
+    velocities asked for at the goal. Limits on the torque rate are imposed after a first solve, a
+    start is led back inside its limits in a time of its own, and many intervals need the merge
+    tree. Equations and distances are followed from a motion that nearly is a solution.
+    near: whether the guess is one.
     """
-    simple = not (problem.periodic or problem.via or len(problem.passive) > 0)
-    of_motion = any(each.y.needs - {"q"} for each in problem.equations)
-    simple = simple and not of_motion and (not problem.equations or (near and problem.limited))
-    timed = problem.ld.lagrangian.timed or problem.ld.segments is not None
-    timed = timed or any(each.timed for each in problem.bounds)
-    limits = problem.limits
-    rates = limits is not None and (limits.on_torque_rate or bool(limits.excused))
-    small = problem.grid.intervals <= MAX_BAND_INTERVALS
-    distances = problem.distances
-    clear = distances is None or (near and takes_rows(problem) and not distances.paths)
-    return simple and not timed and small and not rates and clear
+    equations, distances, limits = problem.equations, problem.distances, problem.limits
+    last = problem.grid.intervals
+    if problem.periodic or problem.via or len(problem.passive) > 0:
+        return False
+    if problem.ld.segments is not None or last > MAX_BAND_INTERVALS:
+        return False
+    if problem.ld.lagrangian.timed or any(each.timed for each in problem.bounds):
+        return False
+    if limits is not None and (limits.on_torque_rate or limits.excused):
+        return False
+    if any(each.y.needs - {"q"} or each.where.node < last for each in equations):
+        return False
+    if distances is not None and (distances.paths or not takes_rows(problem)):
+        return False
+    return near or (not equations and distances is None)
 
 
 @one_blas_thread
@@ -85,7 +91,7 @@ def solve_jointly(
         exact=True,
         barrier=barrier,
     )
-    if problem.limited:
+    if problem.limited or problem.constrained:
         limits = problem.limits or no_limits(problem.coordinates)
         result = _limited(first, limits, Start(guess, near=near), price, criteria)
     else:
@@ -135,7 +141,21 @@ def _limited(
     if reason:
         message = f"no motion within the limits was found: {reason}."
         return Answer.at(problem, start.x, Status.INFEASIBLE, message)
-    return minimum_within_limits(problem, limits, start, price, criteria)
+    deadline = Deadline(criteria.time_limit)
+    found = minimum_within_limits(problem, limits, start, price, criteria)
+    T = found.problem.grid.duration
+    inside = all(not math.isclose(T, x, rel_tol=1e-12) for x in (price.lower, price.upper))
+    if inside or found.status is not Status.MINIMUM:
+        return found
+    # as for a given duration: the barrier was relative to the cost with the price of time
+    again = InteriorPoint().minimize(
+        found.problem,
+        Start(found.path, found.central, near=True),
+        dataclasses.replace(criteria, time_limit=deadline.seconds_left),
+    )
+    steps, history = found.nit + again.nit, [*found.history, *again.history]
+    best = again if again.status is Status.MINIMUM else found
+    return dataclasses.replace(best, nit=steps, history=history)
 
 
 def _negative_eigenvalues(objective: TimedAction, ended: Ended[TimedPath, None]) -> int:

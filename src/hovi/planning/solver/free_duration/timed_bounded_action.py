@@ -33,8 +33,8 @@ class TimedBoundedAction(BoundedObjective[TimedPath]):
     the unknowns, and the forces of limits count T0 / T times in the integral over T. Where
     distances are least does not change with T: their rows stay where they are in their intervals.
 
-    first: the action with the bounds, in nodal coordinates, for the duration T0; see at.
-    price: of time.
+    first: the action with the bounds, in nodal coordinates, for the duration T0; its expansions
+    keep those at the points from now on. price: of time.
     """
 
     radii = 20.0, 20.0  # a long step in time leads to another motion
@@ -47,7 +47,7 @@ class TimedBoundedAction(BoundedObjective[TimedPath]):
         self._slopes: list[Array] = []
         self._terms: tuple[Array, Array, Array] | None = None
         self._last = first  # that of the last model
-        self._stretch = np.zeros(0)
+        self._rates = np.zeros(0)  # d outputs / d log T, (R,)
 
     def at(self, duration: float) -> BoundedAction:
         """The bounded action for a duration, in [s]; the first and the last two are kept."""
@@ -56,14 +56,10 @@ class TimedBoundedAction(BoundedObjective[TimedPath]):
         if duration not in self._at:
             if len(self._at) > 1:
                 del self._at[next(iter(self._at))]
-            self._at[duration] = self._stretched(self.first, duration)
+            self._at[duration] = _stretched(self.first, duration)
         found = self._at[duration]
         found.action.multipliers = self.first.action.multipliers
         return found
-
-    def _stretched(self, action: BoundedAction, duration: float) -> BoundedAction:
-        """The same bounded action for another duration."""
-        return action.stretched(stretched_problem(action.problem, duration))
 
     def action(self, duration: float) -> ActionObjective:
         """The action for a duration, in [s]."""
@@ -108,28 +104,24 @@ class TimedBoundedAction(BoundedObjective[TimedPath]):
         weighted = ((weights * at.plain(each))[own] for each in self._terms)
         of_rows = RowForces(rows, rows.columns("nodal"), rows.values(x.path), *weighted)
         model = TimedModel(at.action, x, inner, self.price, DURATION_METRIC, forces, of_rows)
-        self._stretch = self._rates(at, model, of_rows)
+        self._rates = self._rates_of(at, model, of_rows)
         return model
 
-    def _rates(self, at: BoundedAction, model: TimedModel, rows: RowForces) -> Array:
+    def _rates_of(self, at: BoundedAction, model: TimedModel, rows: RowForces) -> Array:
         """Derivatives of the outputs in log T, (R,)."""
-        changed = []
-        for jet, (_y, J) in zip(model.jets, model.expansion.outputs, strict=True):
-            dx = stretch_of(jet)
-            changed.append(np.concatenate([dx, np.matmul(J, dx[:, :, None])[:, :, 0]], axis=1))
-        plain = np.append(at.changes(np.concatenate(changed)), rows.slopes)
+        plain = np.append(at.push_jets([stretch_of(jet) for jet in model.jets]), rows.slopes)
         rates = at.ordered(np.append(plain, np.zeros(len(self.bounds.weights) - len(plain))))
-        return rates if model.ends is None else rates + at.pushed(model.ends)
+        return rates if model.ends is None else rates + at.push_columns(model.ends)
 
     def push(self, step: Array, model: QuadraticModel) -> Array:
         """First-order change of the bounded outputs, shape (R,)."""
-        return self._last.pushed(model.gather(step)) + float(step[-1]) * self._stretch
+        return self._last.push_columns(model.gather(step)) + float(step[-1]) * self._rates
 
     def pull(self, forces: Array, model: QuadraticModel) -> Array:
         """Gradient of sum of weights (forces y) in the columns and log T."""
         assert isinstance(model, TimedModel)
         columns = self._last.pull(self.fraction(model.x.duration) * forces, model.inner)
-        return np.append(columns, np.vdot(self.bounds.weights * forces, self._stretch))
+        return np.append(columns, np.vdot(self.bounds.weights * forces, self._rates))
 
     def accept(self, step: Array, model: QuadraticModel) -> None:
         """Use the outputs that the step predicts as weights of the next model's curvature."""
@@ -159,9 +151,8 @@ class TimedBoundedAction(BoundedObjective[TimedPath]):
 
     def _refined(self, at: BoundedAction, found: Refinement | None) -> Refinement | None:
         """What was found at a duration, after the others take it over."""
-        self.blocked = at.blocked
         if found is not None:
-            self.first = self._stretched(at, self.first.problem.grid.duration)
+            self.first = _stretched(at, self.first.problem.grid.duration)
             self._at.clear()
             self.bounds, self.reopens = self.first.bounds, self.first.reopens
         return found
@@ -169,3 +160,8 @@ class TimedBoundedAction(BoundedObjective[TimedPath]):
     def retract(self, x: TimedPath, step: Array, model: QuadraticModel) -> TimedPath:
         """The motion in the new duration, then moved by the step in the columns."""
         return moved_in_time(self.action, self.price, x, step, model)
+
+
+def _stretched(action: BoundedAction, duration: float) -> BoundedAction:
+    """The same bounded action for another duration, in [s]."""
+    return action.stretched(stretched_problem(action.problem, duration))

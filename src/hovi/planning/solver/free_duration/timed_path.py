@@ -56,8 +56,9 @@ class TimedPath:
 def stretched_problem(problem: TrajectoryProblem, duration: float) -> TrajectoryProblem:
     """The problem for another duration, for solvers: its checks of the duration are not made.
 
-    For problems without conditions, on whose duration nothing but the discrete Lagrangian depends:
-    the structure of the Hessian depends on the proportions of the steps alone.
+    For problems of which nothing but the discrete Lagrangian depends on the duration, and whose
+    conditions do not depend on time: the structure of the Hessian depends on the proportions of the
+    steps alone.
     """
     if duration == problem.grid.duration:
         return problem

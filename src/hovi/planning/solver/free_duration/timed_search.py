@@ -71,36 +71,39 @@ class TimedSearch(BoundedSearch):
         """Solve with bounds at the quadrature points, from the problem's duration."""
         raise_if_late()
         problem, criteria = self.problem, self.remaining_criteria()
-        criteria = dataclasses.replace(criteria, decrease=LAST_DECREASE, plain=False)
         known = self.known_multipliers(start.x)
-        first = self.objective(known, "band", None if known is None else EXACT_TOLERANCES)
+        first = self.objective(known, "band", EXACT_TOLERANCES)
         objective = TimedBoundedAction(first, self.price)
+        criteria = dataclasses.replace(criteria, decrease=LAST_DECREASE, plain=False)
         x = TimedPath(start.x, problem.grid.duration)
         found = minimize_bounded(objective, Start(x, start.z), criteria, self.report)
         self.iterations += len(found.steps)
         self.history += found.steps
+        if found.why is Reason.STATIONARY and not objective.satisfies_equations(found.x):
+            found.why = Reason.DIVERGED
         first = objective.first
-        self.rows, self.multipliers = first.rows or self.rows, first.action.multipliers
+        self.rows = first.rows or self.rows
+        if found.why is not Reason.DIVERGED:
+            self.multipliers = first.action.multipliers
         if isinstance(first, ClearedAction):
             self.near = first.near
         self._stretch(found.x.duration)
         self.last = self.problem, found.x.path
         ended = self._at_its_duration(found, objective)
         self.points = []  # these are of other durations
-        if ended.why is Reason.STATIONARY:
-            self.unmet = spurious_sentence(self.problem, ended.x)
-            if not objective.satisfies_equations(found.x):
-                ended.why = Reason.DIVERGED
-        if ended.why is Reason.STATIONARY and ended.saved:
+        stationary = ended.why is Reason.STATIONARY
+        self.unmet = spurious_sentence(self.problem, ended.x) if stationary else ""
+        if stationary and ended.saved:
             self._add_points(ended, objective.at(found.x.duration))
         return ended
 
     def solve_fixed(self, path: DiscretePath) -> Bounded:
         """Solve for the problem's duration, well enough for a motion that is to be stretched."""
         known, rough = self.known_multipliers(path), self.remaining_criteria().rough()
-        objective = self.objective(known, tolerances=None if known is None else ROUGH_TOLERANCES)
+        objective = self.objective(known, tolerances=ROUGH_TOLERANCES)
         ended = self.minimized(objective, Start(path), rough)
-        self.multipliers = objective.action.multipliers
+        if ended.why is not Reason.DIVERGED:
+            self.multipliers = objective.action.multipliers
         return ended
 
     def back_to(self, problem: TrajectoryProblem) -> None:
@@ -156,7 +159,9 @@ def _searched(search: TimedSearch) -> Answer:
     if ended.why in STOPPED or not usable(ended):
         return _ended(search, ended.why)
     ended, reason, _ = tightened(search, ended)
-    reason = reason or search.unmet or search.too_close(ended.x)
+    reason = reason or search.unmet
+    if not reason and ended.why is Reason.STATIONARY:  # others may just lack rows yet
+        reason = search.too_close(ended.x)
     if not reason and ended.why is not Reason.STATIONARY:
         return _ended(search, ended.why)
     problem, x, n_neg = search.problem, ended.x, search.negative_eigenvalues(ended)

@@ -68,8 +68,10 @@ WARM_MU_RANGE = 1e-7, 1e-4
 """Range of the initial barrier parameter of a warm start, relative to the mean density."""
 LEVEL_MARGIN = 0.1
 """Distance of slacks from their bounds at a point of a central path, relative to its parameter."""
-EXACT_TOLERANCES, ROUGH_TOLERANCES = (TORQUE_TOLERANCE, NODE_TOLERANCE), (np.inf, 1e-4)
-"""Residuals of equations at the end of a solve and of a rough one: see BoundedAction."""
+EXACT_TOLERANCES = TORQUE_TOLERANCE, NODE_TOLERANCE
+"""Residuals of equations at the end of a solve: see BoundedAction."""
+ROUGH_TOLERANCES = np.inf, 1e-4
+"""The same for a rough solve."""
 LOOK_AROUND = 0.02
 """Distance beyond the least one up to which pairs near a known motion get rows, in [m]."""
 
@@ -187,7 +189,7 @@ class BoundedSearch:
         known: multipliers of the constraints. tolerances: see BoundedAction.
         """
         objective = self._objective(known, algebra)
-        objective.tolerances = tolerances
+        objective.tolerances = None if known is None else tolerances
         return objective
 
     def _objective(self, known: Multipliers | None, algebra: LinearAlgebra | None) -> BoundedAction:
@@ -308,7 +310,7 @@ class BoundedSearch:
         return ended
 
     def known_multipliers(self, path: DiscretePath) -> Multipliers | None:
-        """Those of the constraints, the first ones at a path if none are known; None without."""
+        """Known multipliers of the constraints, or first ones at a path; None without any."""
         if not self.problem.constrained:
             return None
         return self.multipliers or first_multipliers(self.problem, path)
@@ -339,9 +341,7 @@ class BoundedSearch:
 
         Those of limits and constraints, penalty terms of the constraints included.
         """
-        multipliers, objective = ended.z.multipliers, self._objective_of(ended)
-        if isinstance(objective, ClearedAction):
-            multipliers = objective.plain(multipliers)
+        multipliers = self._objective_of(ended).plain(ended.z.multipliers)
         limits = len(multipliers) - (0 if self.near is None else self.near.size)
         rows = multipliers[limits - self.rows.size : limits]
         instants, further = forces_of(self.problem, self.rows, rows)

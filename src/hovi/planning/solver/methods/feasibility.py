@@ -175,7 +175,11 @@ def _solved_from_level(search: BoundedSearch, along: CentralPath, level: float) 
 
 
 def solved_from(search: BoundedSearch, path: DiscretePath) -> Bounded:
-    """Solve from a motion that nearly is a solution, with a small barrier from the beginning."""
+    """Solve from a motion that nearly is a solution, with a small barrier from the beginning.
+
+    Parts are halved first, as far as this barrier asks for: the motion may exceed coarser control
+    points.
+    """
     search.look_around(path)
     search.rows.refine(path, NEARBY_MU)
     return search.solve(search.start_at(path, NEARBY_MU, search.objective(search.multipliers)))

@@ -91,7 +91,7 @@ class ClearanceRows:
     def on(self, problem: TrajectoryProblem, behind: LimitRows | None = None) -> ClearanceRows:
         """The same rows of another problem, on as many intervals.
 
-        behind: rows of limits that take the place of those that these are behind, in this order.
+        behind: rows of limits of that problem, if `order` is to be kept; it starts anew if None.
         """
         rows = copy.copy(self)
         rows._followed = behind

@@ -65,7 +65,6 @@ class ClearedAction(BoundedAction):
         self._limit_outputs = RecentPaths[Array]()
         super().__init__(problem, limits, margins, algebra, multipliers, more, rows)
         self._near: ExpandedRows | None = None
-        self._force = np.zeros(0)
 
     def _with_rows(self) -> None:
         super()._with_rows()
@@ -141,9 +140,9 @@ class ClearedAction(BoundedAction):
 
         return add
 
-    def pushed(self, columns: Array) -> Array:
-        """See BoundedAction.pushed."""
-        dy = super().pushed(columns)
+    def push_columns(self, columns: Array) -> Array:
+        """See BoundedAction.push_columns."""
+        dy = super().push_columns(columns)
         if self._near is None:
             return dy
         return self.ordered(np.append(dy, self._near.push(columns)))
@@ -236,7 +235,7 @@ class ClearedAction(BoundedAction):
     @property
     def _limit_count(self) -> int:
         """The number of outputs that are no distances."""
-        return self._point_count + (0 if self.rows is None else self.rows.size)
+        return int(self.row_outputs.stop)
 
     def ordered(self, plain: Array) -> Array:
         """See BoundedAction.ordered."""
