@@ -34,7 +34,7 @@ KINDS = (
     "a joint's power limited",
 )
 BALL, POWER = 0.05, 100.0
-"""Radius of the ball at the middle of the straight way in joint space, in [m], and power in [W]."""
+"""Radius of the ball in the middle of the path straight in q, in [m], and the power, in [W]."""
 REACHES = 6
 RUNS = 3
 
@@ -54,10 +54,10 @@ def compare(ends: Sequence[Any], weight: float, options: dict[str, Any], runs: i
 
 
 def timed(
-    ends: Sequence[Any], duration: Any, given: dict[str, Any], runs: int
+    ends: Sequence[Any], duration: Any, more: dict[str, Any], runs: int
 ) -> tuple[hovi.Solution, float]:
     """A plan and the least processor time of some runs, in [s]."""
-    times, options = [], {"self_collision": False} | given
+    times, options = [], {"self_collision": False} | more
     for _ in range(runs):
         began = time.process_time()
         found = hovi.plan(*ends, duration, processes=1, **options)

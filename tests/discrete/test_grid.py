@@ -122,3 +122,11 @@ def test_a_range_of_schemes_is_named_by_the_fewest_and_the_most_modes() -> None:
     steps, few, some, many = np.full(3, 0.1), galerkin(2), galerkin(3), galerkin(10)
     assert Grid.uniform(1.0, 4, few).scheme_range == "galerkin-2"
     assert Grid(steps, (many, few, some)).scheme_range == "galerkin-2 to galerkin-10"
+
+
+def test_grids_are_equal_with_the_same_steps_and_schemes_alone() -> None:
+    grid = Grid.uniform(1.0, 4, galerkin(2))
+    assert grid.equals(Grid.uniform(1.0, 4, galerkin(2)))
+    others = Grid.uniform(1.1, 4, galerkin(2)), Grid.uniform(1.0, 5, galerkin(2))
+    more_points = Grid.uniform(1.0, 4, galerkin(2, points=6))
+    assert not any(grid.equals(other) for other in (*others, more_points))

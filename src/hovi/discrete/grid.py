@@ -91,6 +91,10 @@ class Grid(Summarized):
         schemes = tuple(scheme for grid in grids for scheme in grid.schemes)
         return cls(np.concatenate([grid.steps for grid in grids]), schemes)
 
+    def equals(self, other: Grid) -> bool:
+        """Whether another grid has the same steps and the same schemes."""
+        return np.array_equal(self.steps, other.steps) and self.schemes == other.schemes
+
     def stretched(self, duration: float) -> Grid:
         """The grid with all steps scaled to another duration.
 

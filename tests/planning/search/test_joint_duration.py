@@ -234,7 +234,7 @@ KINDS = {
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_free_duration_takes_a_few_times_the_steps_of_a_given_one(kind: str) -> None:
-    """A search around solves takes ten times as many."""
+    """A search around solves takes more than that."""
     scene = hovi.Scene(hovi.load_robot("ur5"), [hovi.effects.Gravity()])
     q0 = np.array([0.0, -1.4, 1.6, -0.2, 0.5, 0.0])
     goal, options = KINDS[kind](scene, q0, q0 + WAY)

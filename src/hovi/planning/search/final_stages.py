@@ -307,5 +307,4 @@ def with_more_points(job: Job) -> Job:
 def on_grid_of(problem: TrajectoryProblem, solution: Solution) -> TrajectoryProblem:
     """The problem on the solution's grid: intervals may have been split, or have more points."""
     grid = solution.trajectory.grid
-    same = np.array_equal(grid.steps, problem.grid.steps) and grid.schemes == problem.grid.schemes
-    return problem if same else problem.on(grid)
+    return problem if grid.equals(problem.grid) else problem.on(grid)

@@ -112,13 +112,9 @@ class GuessCosts:
     def _on(self, lagrangian: Lagrangian, grid: Grid) -> DiscreteLagrangian:
         """The action, that of the guess before if it is the same one."""
         known = self._action
-        if known is None or known.lagrangian is not lagrangian or not _are_equal(known.grid, grid):
+        if known is None or known.lagrangian is not lagrangian or not known.grid.equals(grid):
             self._action = known = DiscreteLagrangian(lagrangian, grid)
         return known
-
-
-def _are_equal(one: Grid, other: Grid) -> bool:
-    return np.array_equal(one.steps, other.steps) and one.schemes == other.schemes
 
 
 def _end(end: State | FrameGoal, guess: Trajectory, node: int, robot: Robot) -> tuple[Array, Array]:

@@ -72,8 +72,7 @@ class TimedSearch(BoundedSearch):
         raise_if_late()
         problem, criteria = self.problem, self.remaining_criteria()
         known = self.known_multipliers(start.x)
-        first = self.objective(known, "band", EXACT_TOLERANCES)
-        objective = TimedBoundedAction(first, self.price)
+        objective = TimedBoundedAction(self.objective(known, "band", EXACT_TOLERANCES), self.price)
         criteria = dataclasses.replace(criteria, decrease=LAST_DECREASE, plain=False)
         x = TimedPath(start.x, problem.grid.duration)
         found = minimize_bounded(objective, Start(x, start.z), criteria, self.report)
@@ -81,12 +80,13 @@ class TimedSearch(BoundedSearch):
         self.history += found.steps
         if found.why is Reason.STATIONARY and not objective.satisfies_equations(found.x):
             found.why = Reason.DIVERGED
-        first = objective.first
-        self.rows = first.rows or self.rows
+        last = objective.first
+        assert last.rows is not None
+        self.rows = last.rows
+        if isinstance(last, ClearedAction):
+            self.near = last.near
         if found.why is not Reason.DIVERGED:
-            self.multipliers = first.action.multipliers
-        if isinstance(first, ClearedAction):
-            self.near = first.near
+            self.multipliers = last.action.multipliers
         self._stretch(found.x.duration)
         self.last = self.problem, found.x.path
         ended = self._at_its_duration(found, objective)

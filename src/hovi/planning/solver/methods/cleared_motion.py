@@ -223,7 +223,7 @@ def _rough(
     """
     criteria = search.remaining_criteria().rough()
     criteria = dataclasses.replace(criteria, max_iterations=min(most, criteria.max_iterations))
-    steps = known is not None and len(search.problem.passive) == 0
-    objective = search.objective(known, tolerances=ROUGH_TOLERANCES if steps else None)
+    tolerances = ROUGH_TOLERANCES if len(search.problem.passive) == 0 else None
+    objective = search.objective(known, tolerances=tolerances)
     start = Start(path) if mu is None else search.start_at(path, mu, objective)
     return search.minimized(objective, start, criteria), objective.action.multipliers
