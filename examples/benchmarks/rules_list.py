@@ -930,7 +930,7 @@ _rule(
     "joint solve",
     "Motion and duration are solved for together where that is supported.",
     "joint_minimum",
-    "not solves_jointly(problem, near)",
+    "not solves_jointly(problem, price.clock, lengths, near)",
     "True",
 )
 _rule(

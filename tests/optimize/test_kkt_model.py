@@ -267,7 +267,9 @@ def bordered(
     inner, H, A = under_equations(curvature=curvature)
     column = np.random.default_rng(4).standard_normal(len(H))
     whole = np.block([[H, column[:, None]], [column, corner]])
-    model = BorderedModel(inner, Border(-1.5, column, corner, 3.0, room))
+    low, high = (np.array([bound]) for bound in room)
+    border = Border(np.array([-1.5]), column[:, None], np.array([[corner]]), 3.0, (low, high))
+    model = BorderedModel(inner, border)
     return model, whole, np.pad(A, ((0, 0), (0, 1)))
 
 

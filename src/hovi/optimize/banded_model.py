@@ -222,22 +222,22 @@ class BandModel(QuadraticModel):
         self._last = shift, BandFactor(factor, rows) if definite else None
         return self._last[1]
 
-    def negative_eigenvalues(self, border: tuple[Array, float] | None = None) -> int:
+    def negative_eigenvalues(self, border: tuple[Array, Array] | None = None) -> int:
         """Number of negative eigenvalues of H, by elimination of blocks as wide as the band.
 
         The counts of the pivot blocks add up: Haynsworth's inertia additivity.
-        border: a further row b and its diagonal entry c; the count is that of [H b; b^T c].
+        border: further columns B, (size, p), and their corner C; the count is that of
+            [H B; B^T C].
         """
         bands = self.layout.assemble(self.intervals.hessian)
         size, block = self.layout.size, max(bands.shape[1], 1)
         count = 0
         schur = np.zeros((0, 0))
         coupling = np.zeros((0, 0))
-        column: Array = np.zeros(0)
-        solved: Array = np.zeros(0)
-        corner = 1.0
+        columns, corner = np.zeros((size, 0)), np.zeros((0, 0))
         if border is not None:
-            column, corner = border[0].copy(), border[1]
+            columns, corner = border[0].copy(), border[1].copy()
+        solved = columns[:0]
         for first in range(0, size, block):
             last = min(first + block, size)
             pivot = _dense(bands, range(first, last), range(first, last))
@@ -245,14 +245,12 @@ class BandModel(QuadraticModel):
             if first:
                 coupling = _dense(bands, range(first, last), range(first - block, first))
                 pivot -= coupling @ np.linalg.solve(schur, coupling.T)
-                if border is not None:
-                    column[first:last] -= coupling @ solved
+                columns[first:last] -= coupling @ solved
             schur = (pivot + pivot.T) / 2
-            if border is not None:
-                solved = np.asarray(np.linalg.solve(schur, column[first:last]), dtype=np.float64)
-                corner -= float(column[first:last] @ solved)
+            solved = np.asarray(np.linalg.solve(schur, columns[first:last]), dtype=np.float64)
+            corner -= columns[first:last].T @ solved
             count += int(np.sum(np.linalg.eigvalsh(schur) < 0))
-        return count + int(corner < 0)
+        return count + int(np.sum(np.linalg.eigvalsh(corner) < 0))
 
 
 def _dense(bands: Array, rows: range, columns: range) -> Array:

@@ -1,9 +1,10 @@
-"""A quadratic model with one more unknown t, which every interval may depend on.
+"""A quadratic model with a few more unknowns t, which every interval may depend on.
 
-With the model of the other unknowns x, the Hessian is [H b; b^T c] and the metric [D 0; 0 d]. The
-border costs one more solve with the factor of H + shift D: with y = -(H + shift D)^-1 g and
-z = (H + shift D)^-1 b, the step is t = -(g_t + b.y) / p with the pivot p = c + shift d - b.z, and
-x = y - z t. The matrix is positive definite if H + shift D is and p > 0.
+With the model of the other unknowns x, the Hessian is [H B; B^T C] and the metric [D 0; 0 d I]. The
+border costs one more solve with the factor of H + shift D for each of its unknowns: with
+y = -(H + shift D)^-1 g and Z = (H + shift D)^-1 B, the step is t = -P^-1 (g_t + B^T y) with the
+pivot P = C + shift d I - B^T Z, and x = y - Z t. The matrix is positive definite if H + shift D and
+P are.
 """
 
 from __future__ import annotations
@@ -17,49 +18,52 @@ from hovi.optimize.quadratic_model import Factor, QuadraticModel
 from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
+Mask = npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
 class Border:
-    """The part of a quadratic model that belongs to its last unknown t.
+    """The part of a quadratic model that belongs to its last unknowns t.
 
-    slope: g_t. column: b, shape (size,). corner: c. metric: d.
-    room: the least and the largest step of t, of opposite signs or 0; infinite without bounds.
+    slope: g_t, shape (p,). columns: B, (size, p). corner: C, (p, p). metric: d.
+    room: the least and the largest step of t, (p,) each, of opposite signs or 0; infinite without
+        bounds.
     """
 
-    slope: float
-    column: Array
-    corner: float
+    slope: Array
+    columns: Array
+    corner: Array
     metric: float
-    room: tuple[float, float]
+    room: tuple[Array, Array]
 
 
 @dataclass(frozen=True, eq=False)
 class BorderedFactor:
     """A factorisation of the bordered H + shift D.
 
-    inner: of H + shift D. solved: z = (H + shift D)^-1 b. pivot: p; None where t is kept at its
-    bound, since the cost falls beyond it and p is not positive.
+    inner: of H + shift D. columns: B. solved: Z = (H + shift D)^-1 B. pivot: P. free: which of t
+    are not kept at their bounds, (p,): where the cost falls beyond them and P is not positive.
     """
 
     inner: Factor
-    column: Array
+    columns: Array
     solved: Array
-    pivot: float | None
+    pivot: Array
+    free: Mask
 
     def solve(self, rhs: Array) -> Array:
-        """The solution of the bordered system; (H + shift D)^-1 rhs and 0 where t is kept."""
-        x = self.inner.solve(rhs[:-1])
-        if self.pivot is None:
-            return np.append(x, 0.0)
-        t = (rhs[-1] - float(self.column @ x)) / self.pivot
-        return np.append(x - t * self.solved, t)
+        """The solution of the bordered system, 0 where t is kept."""
+        size, t = len(self.columns), np.zeros(len(self.free))
+        x, free = self.inner.solve(rhs[:size]), self.free
+        rest = rhs[size:] - self.columns.T @ x
+        t[free] = np.linalg.solve(self.pivot[np.ix_(free, free)], rest[free])
+        return np.concatenate([x - self.solved @ t, t])
 
 
 class BorderedModel(QuadraticModel):
-    """A banded model with one more unknown, the last one, whose steps have bounds.
+    """A banded model with a few more unknowns, the last ones, whose steps have bounds.
 
-    Equations of the inner model do not depend on it.
+    Equations of the inner model do not depend on them.
     """
 
     def __init__(self, inner: BandModel | EquationModel, border: Border) -> None:
@@ -67,62 +71,66 @@ class BorderedModel(QuadraticModel):
         self.border = border
         self.intervals = inner.intervals
         self.gradient = np.append(inner.gradient, border.slope)
+        self.size = len(inner.gradient)
 
     def scatter(self, local: Array) -> Array:
-        """As that of the other unknowns; 0 in the last one."""
-        return np.append(self.inner.scatter(local), 0.0)
+        """As that of the other unknowns; 0 in the last ones."""
+        return np.append(self.inner.scatter(local), np.zeros_like(self.border.slope))
 
     def gather(self, s: Array) -> Array:
         """The columns of every interval in the other unknowns."""
-        return self.inner.gather(s[:-1])
+        return self.inner.gather(s[: self.size])
 
     def metric_product(self, s: Array) -> Array:
         """D s."""
-        return np.append(self.inner.metric_product(s[:-1]), self.border.metric * s[-1])
+        x, t = s[: self.size], s[self.size :]
+        return np.append(self.inner.metric_product(x), self.border.metric * t)
 
     def factor(self, shift: float) -> BorderedFactor | None:
         """The factorisation, or None where the bordered H + shift D is not positive definite."""
         inner = self.inner.factor(shift)
         if inner is None:
             return None
-        border = self.border
-        solved = inner.solve(border.column)
-        pivot = border.corner + shift * border.metric - float(border.column @ solved)
-        if pivot > 0:
-            return BorderedFactor(inner, border.column, solved, pivot)
-        slope = self._slope_at(self.inner.descend(inner)[0])
-        low, high = border.room
-        kept = (low == 0 and slope > 0) or (high == 0 and slope < 0)
-        return BorderedFactor(inner, border.column, solved, None) if kept else None
+        border, count = self.border, len(self.border.slope)
+        solved = np.stack([inner.solve(b) for b in border.columns.T], axis=1)
+        pivot = border.corner + shift * border.metric * np.eye(count)
+        pivot = pivot - border.columns.T @ solved
+        free = np.ones(count, dtype=bool)
+        if not _positive(pivot):
+            slope, (low, high) = self._slope_at(self.inner.descend(inner)[0]), border.room
+            free = ~(((low == 0) & (slope > 0)) | ((high == 0) & (slope < 0)))
+            if free.all() or not _positive(pivot[np.ix_(free, free)]):
+                return None
+        return BorderedFactor(inner, border.columns, solved, pivot, free)
 
     def descend(self, factor: Factor) -> tuple[Array, float, float]:
         """The minimum of the model with shift, t within its room; see QuadraticModel.descend.
 
-        Where a bound of t holds with a multiplier m, m t is added to the slope, so that the
-        decrease is -slope/2 + shift/2 times the length squared in any case.
+        Where bounds of t hold with multipliers m, m.t is added to the slope, so that the decrease
+        is -slope/2 + shift/2 times the length squared in any case.
         """
         assert isinstance(factor, BorderedFactor)
         x, slope, _ = self.inner.descend(factor.inner)
-        t = multiplier = 0.0
-        rate = self._slope_at(x)
-        if factor.pivot is not None:
-            free = -rate / factor.pivot
-            t = float(np.clip(free, *self.border.room))
-            multiplier = factor.pivot * (t - free)
-        s = np.append(x - t * factor.solved, t)
-        return s, slope + (rate + multiplier) * t, float(s @ self.metric_product(s))
+        rate, free = self._slope_at(x), factor.free
+        t, own = np.zeros(len(free)), np.ix_(free, free)
+        low, high = self.border.room
+        t[free] = least_within(factor.pivot[own], rate[free], low[free], high[free])
+        slope += float(t @ (2.0 * rate + factor.pivot @ t))
+        s = np.append(x - factor.solved @ t, t)
+        return s, slope, float(s @ self.metric_product(s))
 
-    def _slope_at(self, x: Array) -> float:
-        """The slope in t where all else is at its minimum x for t = 0: g_t + b.x."""
-        return self.border.slope + float(self.border.column @ x)
+    def _slope_at(self, x: Array) -> Array:
+        """The slopes in t where all else is at its minimum x for t = 0: g_t + B^T x."""
+        return np.asarray(self.border.slope + self.border.columns.T @ x)
 
     def reaction(
         self, gradient: Array, s: Array, factor: Factor | None
     ) -> tuple[Array, float] | None:
-        """That of the inner model for the gradient g + t b, with the step t."""
+        """That of the inner model for the gradient g + B t, with the step t."""
         if not isinstance(factor, BorderedFactor):
             return None
-        return self.inner.reaction(gradient[:-1] + s[-1] * self.border.column, s[:-1], factor.inner)
+        x, t = s[: self.size], s[self.size :]
+        return self.inner.reaction(gradient[: self.size] + self.border.columns @ t, x, factor.inner)
 
     def curvature_scale(self) -> float:
         """That of the other unknowns."""
@@ -130,4 +138,25 @@ class BorderedModel(QuadraticModel):
 
     def negative_eigenvalues(self) -> int:
         """Number of negative eigenvalues of the bordered Hessian."""
-        return self.inner.negative_eigenvalues((self.border.column, self.border.corner))
+        return self.inner.negative_eigenvalues((self.border.columns, self.border.corner))
+
+
+def least_within(pivot: Array, slope: Array, low: Array, high: Array) -> Array:
+    """t of the least slope.t + 1/2 t.pivot t between bounds; the pivot is positive definite."""
+    t = np.asarray(np.linalg.solve(pivot, -slope), dtype=np.float64)
+    if len(t) == 1:
+        return np.clip(t, low, high)
+    if ((low <= t) & (t <= high)).all():
+        return t
+    from scipy.optimize import lsq_linear  # takes a quarter of a second to import
+
+    upper = np.linalg.cholesky(pivot).T
+    target = np.linalg.solve(upper.T, -slope)
+    wide = np.maximum(high, low + np.finfo(float).tiny)  # equal bounds are none to it
+    found = lsq_linear(upper, target, (low, wide), method="bvls", tol=1e-14)
+    return np.asarray(np.clip(found.x, low, high))
+
+
+def _positive(matrix: Array) -> bool:
+    """Whether a symmetric matrix is positive definite."""
+    return bool(np.isfinite(matrix).all() and (np.linalg.eigvalsh(matrix) > 0).all())

@@ -90,6 +90,6 @@ class EquationModel(QuadraticModel):
         """That of the model alone."""
         return self.inner.curvature_scale()
 
-    def negative_eigenvalues(self, border: tuple[Array, float] | None = None) -> int:
-        """Number of negative eigenvalues of H, or [H b; b^T c], on the tangent space A s = 0."""
+    def negative_eigenvalues(self, border: tuple[Array, Array] | None = None) -> int:
+        """Number of negative eigenvalues of H, or [H B; B^T C], on the tangent space A s = 0."""
         return self.kkt.negative_eigenvalues(border)

@@ -346,15 +346,16 @@ class KktModel:
         matrix.ravel()[self.layout.corners] = -delta
         return KktFactor(self.layout, matrix, self.metric, shift, removed, rho)
 
-    def negative_eigenvalues(self, border: tuple[Array, float] | None = None) -> int:
+    def negative_eigenvalues(self, border: tuple[Array, Array] | None = None) -> int:
         """Number of negative eigenvalues of H on the tangent space A s = 0; -1 if undecided.
 
         Those of the KKT matrix less the number of equations: see [Gould1985]. Two values of delta
         have to agree.
-        border: a further row b of H and its diagonal entry c, of an unknown that is in no equation.
+        border: further columns B of H, (size, p), and their corner C, of unknowns that are in no
+            equation.
         """
         factors = [self._without_delta(0.0, d * DELTA) for d in (1.0, 1e-2)]
-        counts = {factor.negative + _negative_pivot(factor, border) for factor in factors}
+        counts = {factor.negative + _negative_pivots(factor, border) for factor in factors}
         return -1 if len(counts) > 1 else max(counts.pop() - self.equations, -1)
 
     def jacobian_product(self, s: Array) -> Array:
@@ -393,16 +394,17 @@ class KktModel:
         return self.normal_factor(1.0).solve(-self.gradient, np.zeros(self.equations))[1]
 
 
-def _negative_pivot(factor: KktFactor, border: tuple[Array, float] | None) -> int:
-    """1 if the pivot c - b.H^-1 b of a border is negative, else 0: Haynsworth's additivity.
+def _negative_pivots(factor: KktFactor, border: tuple[Array, Array] | None) -> int:
+    """Negative eigenvalues of the pivot C - B^T H^-1 B of a border: Haynsworth's additivity.
 
-    H^-1 b under the equations.
+    H^-1 B under the equations.
     """
     if border is None or factor.negative < 0:
         return 0
-    column, corner = border
-    solved, _ = factor.solve(column, np.zeros(len(factor.layout.multipliers)))
-    return int(corner < float(column @ solved))
+    columns, corner = border
+    none = np.zeros(len(factor.layout.multipliers))
+    solved = np.stack([factor.solve(b, none)[0] for b in columns.T], axis=1)
+    return int(np.sum(np.linalg.eigvalsh(corner - columns.T @ solved) < 0))
 
 
 def size_of(c: Array) -> float:

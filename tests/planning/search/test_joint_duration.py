@@ -39,17 +39,20 @@ def ends_of(name: str) -> tuple[tuple[Any, ...], dict[str, Any]]:
         pytest.param("ur5_reach_limited", {"tolerance": 1e-3}, id="ur5_reach_limited-tol"),
     ],
 )
-def test_a_free_duration_takes_at_most_three_times_the_steps_of_its_own_value(
+def test_a_free_duration_takes_at_most_three_times_the_steps_of_given_ones(
     name: str, grid: dict[str, Any]
 ) -> None:
+    """In the mean of the duration that was found and two within one per cent of it."""
     weight, bounds, _ = SCENES[name]
     ends, options = ends_of(name)
     free = hovi.plan(*ends, bounds, time_weight=weight, **options, **grid, self_collision=False)
     assert free.success, free.message
     assert abs(free.duration_derivative + weight) <= 1e-7 * weight
-    fixed = hovi.plan(*ends, free.trajectory.duration, **options, **grid, self_collision=False)
-    assert fixed.success, fixed.message
-    assert free.nit <= 3 * fixed.nit
+    given = options | grid | {"self_collision": False}
+    T = free.trajectory.duration
+    fixed = [hovi.plan(*ends, fraction * T, **given) for fraction in (0.99, 1.0, 1.01)]
+    assert all(each.success for each in fixed)
+    assert free.nit <= sum(each.nit for each in fixed)
     assert "The best duration is" in free.message
 
 

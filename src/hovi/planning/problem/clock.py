@@ -1,64 +1,133 @@
-"""Clock: the times of a motion as functions of the length of a part of it, which is free."""
+"""Clock: the times of a motion as functions of the lengths of parts of it, which are free."""
 
 from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
 
 from hovi.discrete.grid import Grid
 from hovi.discrete.guess import Curve
+from hovi.planning.problem.goals import Via
+from hovi.planning.problem.limits import Limits
+from hovi.scene.lagrangian import Lagrangian
+from hovi.scene.segmented_lagrangian import SegmentedLagrangian
 from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
+Index = npt.NDArray[np.intp]
+Mask = npt.NDArray[np.bool_]
+Lengths = Array | float
+"""Of the parts, in [s], shape (p,); a number for a single one."""
 
 
 @dataclass(frozen=True)
 class Clock:
-    """Times t(L) of a motion with a part of length L: before it they stay, after it they shift.
+    """Times of a motion with p parts of free lengths, between which it lasts as long as given.
 
-    The intervals of the part keep their proportions.
-    before, after: how long the motion lasts before and after the part, in [s].
+    The intervals of a part keep their proportions.
+    given: how long the motion lasts before the first part, between any two, and after the last, in
+        [s]; p + 1 numbers. The single part of the default is the whole motion.
     """
 
-    before: float = 0.0
-    after: float = 0.0
+    given: tuple[float, ...] = (0.0, 0.0)
 
     @property
     def whole(self) -> bool:
-        """Whether the part is the whole motion."""
-        return self.before == 0.0 and self.after == 0.0
+        """Whether the whole motion is one part."""
+        return self.given == (0.0, 0.0)
+
+    @property
+    def before(self) -> float:
+        """How long the motion lasts before the first part, in [s]."""
+        return self.given[0]
+
+    def with_given(self, lengths: Array, given: Mask) -> Clock:
+        """The clock with fewer free parts: some of the lengths are given, shape (p,) each."""
+        times = [self.given[0]]
+        for length, fixed, after in zip(lengths.tolist(), given, self.given[1:], strict=True):
+            if fixed:
+                times[-1] += length + after
+            else:
+                times.append(after)
+        return Clock(tuple(times))
 
     def length(self, grid: Grid) -> float:
-        """L of a motion on a grid, in [s]."""
-        return grid.duration - self.before - self.after
+        """The length of a single part of a motion on a grid, in [s]."""
+        before, after = self.given
+        return grid.duration - before - after
 
-    def duration(self, length: float) -> float:
+    def duration(self, lengths: Lengths) -> float:
         """T of the motion, in [s]."""
-        return self.before + length + self.after
+        return float(self.knots(lengths)[-1])
 
-    def times(self, t: Array, now: float, length: float) -> Array:
-        """Where times of a motion with a part of one length are with another one, in [s]."""
-        part = np.clip(t - self.before, 0.0, now)
-        return np.asarray(t + part * (length / now - 1.0))
+    def knots(self, lengths: Lengths) -> Array:
+        """0, the times at which each part begins and ends, and T, in [s], shape (2 p + 2,)."""
+        between = np.zeros(2 * len(self.given))
+        between[1::2], between[2::2] = self.given, lengths
+        return np.cumsum(between)
 
-    def grid(self, grid: Grid, length: float) -> Grid:
-        """A grid with nodes at both ends of the part, for another length."""
+    def times(self, t: Array, now: Lengths, lengths: Lengths) -> Array:
+        """Where times of a motion with parts of some lengths are with others, in [s]."""
+        knots, moved = self.knots(now), self.knots(lengths)
+        distinct = np.append(np.diff(knots) > 0, True)
+        return np.asarray(np.interp(t, knots[distinct], moved[distinct]))
+
+    def nodes(self, grid: Grid, lengths: Lengths) -> Index:
+        """The nodes at which each part of a motion begins and ends, shape (p, 2)."""
         if self.whole:
-            return grid.stretched(length)
-        first, last = self._nodes(grid)
-        steps = grid.steps.copy()
-        steps[first:last] *= length / float(steps[first:last].sum())
-        return Grid(steps, grid.schemes)
+            return np.array([[0, grid.intervals]])
+        ends = self.knots(lengths)[1:-1]
+        nearest = np.abs(grid.t - ends[:, None]).argmin(axis=1)
+        return np.asarray(nearest.reshape(-1, 2))
+
+    def parts(self, grid: Grid, lengths: Lengths) -> Index:
+        """The number of the part of every interval, -1 for none, shape (N,)."""
+        parts = np.full(grid.intervals, -1)
+        for i, (first, last) in enumerate(self.nodes(grid, lengths)):
+            parts[first:last] = i
+        return parts
+
+    def ratios(self, grid: Grid, now: Lengths, lengths: Lengths) -> Array:
+        """By which the steps of a grid grow with other lengths, shape (N,)."""
+        grown = np.append(np.atleast_1d(lengths) / np.atleast_1d(now), 1.0)
+        return grown[self.parts(grid, now)]
+
+    def grid(self, grid: Grid, now: Lengths, lengths: Lengths) -> Grid:
+        """A grid with nodes at both ends of the parts, for other lengths."""
+        if self.whole:
+            return grid.stretched(self.duration(lengths))
+        return Grid(grid.steps * self.ratios(grid, now, lengths), grid.schemes)
 
     def rates(self, grid: Grid) -> Array:
-        """dt/dL of the nodes of a grid, shape (N + 1,)."""
-        first, last = self._nodes(grid)
-        steps = np.zeros(grid.intervals)
-        steps[first:last] = grid.steps[first:last]
+        """dt/dL of the nodes of a grid, for the length L of a single part, shape (N + 1,)."""
+        steps = np.where(self.parts(grid, self.length(grid)) == 0, grid.steps, 0.0)
         return np.asarray(np.append(0.0, np.cumsum(steps)) / steps.sum())
 
+    def lagrangian(self, of: Lagrangian, now: Lengths, lengths: Lengths) -> Lagrangian:
+        """L of a motion with other lengths: segments end at other times."""
+        if not isinstance(of, SegmentedLagrangian):
+            return of
+        ends = self.times(np.array(of.ends), now, lengths)
+        return SegmentedLagrangian(of.lagrangians, tuple(ends.tolist()))
+
+    def limits(self, limits: Limits, now: Lengths, lengths: Lengths) -> Limits:
+        """The same of limits."""
+        if not limits.parts:
+            return limits
+        ends = self.times(np.array(limits.ends), now, lengths)
+        return Limits.of_segments(limits.parts, ends.tolist())
+
+    def via(self, via: Sequence[Via], now: Lengths, lengths: Lengths) -> tuple[Via, ...]:
+        """Via points at the times at which they are then."""
+        times = self.times(np.array([each.time for each in via]), now, lengths).tolist()
+        moved = zip(via, times, strict=True)
+        return tuple(dataclasses.replace(each, time=t) for each, t in moved)
+
     def curve(self, curve: Curve, now: float, length: float, order: int) -> Curve:
-        """A motion as a curve with another length of the part. now: its own length, in [s].
+        """A motion as a curve with another length of a single part. now: its own, in [s].
 
         Derivatives up to q^(order); they jump where the part begins and ends.
         """
@@ -71,9 +140,3 @@ class Clock:
             return tuple(x * rate**j for j, x in enumerate(jet[: order + 1]))
 
         return moved
-
-    def _nodes(self, grid: Grid) -> tuple[int, int]:
-        """The nodes at which the part begins and ends."""
-        ends = self.before, grid.duration - self.after
-        first, last = (int(np.argmin(np.abs(grid.t - end))) for end in ends)
-        return first, last

@@ -26,6 +26,7 @@ from hovi.planning.clearance.distances import Distances
 from hovi.planning.clearance.within_reach import distances_within_reach, with_gaps
 from hovi.planning.conditions.asked import asked_at_nodes, bounded_of, checked, require_ranges
 from hovi.planning.conditions.condition import Condition, Equation, Inequality, equation
+from hovi.planning.problem.clock import Clock, Lengths
 from hovi.planning.problem.conserved_momentum import Stop, kept_in_free_fall
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.goals import Via, goal_state
@@ -227,6 +228,14 @@ class TrajectoryProblem(ProblemSummary):
     def on(self, grid: Grid) -> TrajectoryProblem:
         """The same problem on another grid."""
         return self._with(DiscreteLagrangian(self.ld.lagrangian, grid))
+
+    def lasting(self, clock: Clock, now: Lengths, lengths: Lengths) -> TrajectoryProblem:
+        """The same problem with other lengths of its parts. now: its own, in [s]."""
+        grid = clock.grid(self.grid, now, lengths)
+        ld = DiscreteLagrangian(clock.lagrangian(self.ld.lagrangian, now, lengths), grid)
+        limits = None if self.limits is None else clock.limits(self.limits, now, lengths)
+        via = clock.via(self.via, now, lengths)
+        return dataclasses.replace(self, ld=ld, limits=limits, via=via)
 
     def _with(self, ld: DiscreteLagrangian) -> TrajectoryProblem:
         grid, T = ld.grid, self.grid.duration

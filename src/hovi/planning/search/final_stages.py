@@ -8,6 +8,7 @@ from functools import partial
 from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
+import numpy.typing as npt
 
 from hovi.discrete.grid import DiscretePath, Grid
 from hovi.discrete.trajectory import Trajectory
@@ -25,6 +26,7 @@ from hovi.planning.refinement.inactive_limits import (
 from hovi.planning.search.free_duration import FreeDuration, SolveFor
 from hovi.planning.search.job import Job, split_for_charts
 from hovi.planning.search.multistart import Pool, default_processes, distinct
+from hovi.planning.solver.free_duration.timed_path import TimePrice
 from hovi.planning.solver.initial_path import guess_path
 from hovi.planning.solver.solver import Solution, solve_on_grid
 from hovi.planning.solver.status import Status
@@ -37,6 +39,8 @@ from hovi.system.progress import Progress
 if TYPE_CHECKING:
     from hovi.planning.search.free_segments import FreeSegments
     from hovi.planning.search.joint_duration import OnGrid
+
+Array = npt.NDArray[np.float64]
 
 NAMED_GUESSES = ("cubic", "minimum-jerk")
 MAX_CHART_ROUNDS = 4
@@ -129,9 +133,10 @@ class FinalStages:
         from hovi.planning.search.free_to_tolerance import MAX_GRIDS
 
         job, steps, tolerance = self.fine, 0, self.fine.tolerance
-        best = dataclasses.replace(found, problem=on_grid_of(job.problem(), found))
+        best = found
         for _ in range(MAX_GRIDS):
-            job, best = best_segments(free, job, best, self._solver_of)
+            best = dataclasses.replace(best, problem=on_grid_of(job.problem(), best))
+            job, best = best_segments(free, job, best, self._solver_of, self._solve_jointly)
             steps += best.nit
             if tolerance is None or not best.success:
                 break
@@ -237,27 +242,32 @@ class FinalStages:
         if not solution.success and solution.status is not Status.INFEASIBLE:
             length = free.clock.length(self.fine.grid)
             first = on_grid(self.fine.grid)(length, solution.trajectory)
-        jointly = partial(self._solve_jointly, free)
+
+        def jointly(first: Solution) -> Solution | None:
+            return self._solve_jointly(free.price, np.array([free.length(first)]), first)
+
         if self.fine.tolerance is None:
             return best_on_its_grid(free, on_grid, first, jointly=jointly).with_time()
         refine = partial(self.refined, self.fine.tolerance, f"{which}: ")
         return free_to_tolerance(free, on_grid, refine, first, jointly)
 
-    def _solve_jointly(self, free: FreeDuration, first: Solution) -> Solution | None:
-        """A minimum in the motion and the duration from a motion; None where not supported."""
+    def _solve_jointly(self, price: TimePrice, now: Array, first: Solution) -> Solution | None:
+        """A minimum in the motion and lengths of parts from a motion; None where not supported."""
         from hovi.planning.search.joint_duration import joint_minimum
 
         left, most = self.deadline.seconds_left, self.fine.options.max_iterations
         problem, path = first.problem, first.trajectory.path
         if problem is None:
             return None
-        return joint_minimum(free, problem, path, most, left, True, self.fine.barrier)
+        barrier = self.fine.barrier
+        return joint_minimum(price, now, problem, path, most, left, True, barrier)
 
     def _lasting(self, clock: Clock, grid: Grid) -> SolveFor:
         """A solver on a grid whose free part is stretched to each length."""
 
         def solve_for(length: float, guess: Trajectory) -> Solution:
-            job = self.fine.lasting(clock, length, grid)
+            stretched = clock.grid(grid, clock.length(grid), length)
+            job = self.fine.lasting(clock, length, grid=stretched)
             if clock.whole:
                 return self._solve(job, guess)
             order, now = job.grid.order, clock.length(guess.grid)

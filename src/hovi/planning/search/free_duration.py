@@ -22,6 +22,7 @@ from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError
 from hovi.planning.problem.clock import Clock
 from hovi.planning.search.continuation import STOPPED, how_ended
+from hovi.planning.solver.free_duration.timed_path import TimePrice
 from hovi.planning.solver.outcome.cost_with_time import price_of_time
 from hovi.planning.solver.solver import Solution
 from hovi.planning.solver.status import Status
@@ -79,6 +80,11 @@ class FreeDuration:
     def first(self) -> float:
         """The first length of the search: the geometric mean of the bounds, in [s]."""
         return float(np.sqrt(self.lower * self.upper))
+
+    @property
+    def price(self) -> TimePrice:
+        """The price of time and the bounds, of a single part."""
+        return TimePrice(self.weight, np.array([self.lower]), np.array([self.upper]), self.clock)
 
     def length(self, solution: Solution) -> float:
         """The length of the free part of a motion, in [s]."""

@@ -1,9 +1,9 @@
-"""The best durations of the segments of a sequence, one after the other until none changes.
+"""The best durations of the segments of a sequence: all in one solve where that is supported.
 
-With a motion at its minimum for given durations, the cost J + w T changes with the duration of each
-segment by minus its Hamiltonian plus w. So each duration is searched for as that of a single motion
-is, with the others as they are; where the motion rests between segments, they do not depend on each
-other.
+Else one after the other until none changes. With a motion at its minimum for given durations, the
+cost J + w T changes with the duration of each segment by minus its Hamiltonian plus w. So each
+duration is searched for as that of a single motion is, with the others as they are; where the
+motion rests between segments, they do not depend on each other.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from collections.abc import Callable, Sequence
 from typing import Self
 
 import numpy as np
+import numpy.typing as npt
 
 from hovi.planning.problem.clock import Clock
 from hovi.planning.search.free_duration import MAX_STRIDE, BestDuration, FreeDuration
@@ -24,14 +25,19 @@ from hovi.planning.search.joint_duration import (
     is_best,
     unless_best,
 )
+from hovi.planning.solver.free_duration.timed_path import TimePrice
 from hovi.planning.solver.solver import Solution
+from hovi.scene.segmented_lagrangian import SegmentedLagrangian
 from hovi.system.dataclass import dataclass
 
 MAX_SWEEPS = 10
 """Maximum number of searches for the duration of every segment."""
 
+Array = npt.NDArray[np.float64]
 SolverOf = Callable[[Job, Clock], OnGrid]
 """Returns a solver of a job on a grid, whose free part has each length."""
+JointSolveOf = Callable[[TimePrice, Array, Solution], Solution | None]
+"""Solves for lengths of parts, too, from those of a motion; None where that is not supported."""
 
 
 @dataclass(frozen=True)
@@ -70,17 +76,63 @@ class FreeSegments:
         if lower == upper:
             return None
         begin, end = _ends(job)[number : number + 2]
-        return FreeDuration(lower, upper, self.weight, Clock(begin, job.grid.duration - end))
+        return FreeDuration(lower, upper, self.weight, Clock((begin, job.grid.duration - end)))
+
+    def all_parts(self, lengths: Array) -> TimePrice:
+        """The price of time of all free segments. lengths: of all segments, in [s]."""
+        lower, upper = np.array(self.bounds).T
+        clock = Clock((0.0,) * (len(lower) + 1))
+        return TimePrice(self.weight, lower, upper, clock).with_given(lengths, lower == upper)
 
 
 def best_segments(
-    free: FreeSegments, job: Job, first: Solution, solver_of: SolverOf
+    free: FreeSegments, job: Job, first: Solution, solver_of: SolverOf, jointly: JointSolveOf
 ) -> tuple[Job, Solution]:
     """The job with the best durations of its segments, and its motion.
 
-    first: the motion of the job. The motion is no success unless the duration of every segment is
-    the best one, with those of the others as they are.
+    first: the motion of the job, with its problem. The motion is no success unless the duration of
+    every segment is the best one, with those of the others as they are.
     """
+    if _all_are_best(free, job, first):
+        return job, first
+    together = _all_at_once(free, job, first, jointly)
+    if together is None:
+        return _one_by_one(free, job, first, solver_of)
+    job, best = together
+    if not best.success or _all_are_best(free, job, best):
+        return job, best
+    return _one_by_one(free, job, best, solver_of)
+
+
+def _all_are_best(free: FreeSegments, job: Job, motion: Solution) -> bool:
+    """Whether every duration is the best one, with those of the others as they are."""
+    parts = (free.part(number, job) for number in range(len(free.bounds)))
+    found = (BestDuration(part, motion, motion.nit, "") for part in parts if part is not None)
+    return all(is_best(each) for each in found)
+
+
+def _all_at_once(
+    free: FreeSegments, job: Job, first: Solution, jointly: JointSolveOf
+) -> tuple[Job, Solution] | None:
+    """The job and the motion by one solve for all durations; None where that does not succeed."""
+    now = np.diff(_ends(job))
+    price = free.all_parts(now)
+    found = jointly(price, now[[lower < upper for lower, upper in free.bounds]], first)
+    problem = None if found is None else found.problem
+    if found is None or problem is None:
+        return None
+    found = dataclasses.replace(found, nit=first.nit + found.nit)
+    grid, lagrangian = found.trajectory.grid, problem.ld.lagrangian
+    assert isinstance(lagrangian, SegmentedLagrangian)
+    lengths = np.diff([0.0, *lagrangian.ends, grid.duration])
+    whole = Clock((0.0,) * (len(now) + 1))
+    return job.lasting(whole, lengths, now, grid), found
+
+
+def _one_by_one(
+    free: FreeSegments, job: Job, first: Solution, solver_of: SolverOf
+) -> tuple[Job, Solution]:
+    """As `best_segments`, with a search for one duration after the other."""
     best, steps, found = first, first.nit, dict[int, BestDuration]()
     for _ in range(MAX_SWEEPS):
         changed = False
@@ -92,7 +144,7 @@ def best_segments(
             reached = best_on_its_grid(part, solver_of(job, part.clock), best, stride)
             changed, found[number] = True, reached
             steps, best = steps + reached.steps - best.nit, reached.solution
-            job = job.lasting(part.clock, part.length(best), best.trajectory.grid)
+            job = job.lasting(part.clock, part.length(best), grid=best.trajectory.grid)
             if not best.success:
                 return job, dataclasses.replace(reached.with_time(), nit=steps)
         if not changed:

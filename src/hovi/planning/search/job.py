@@ -18,7 +18,7 @@ from hovi.discrete.trajectory import Trajectory
 from hovi.effects import Effect
 from hovi.errors import ChartError
 from hovi.planning.conditions.asked import times_of
-from hovi.planning.problem.clock import Clock
+from hovi.planning.problem.clock import Clock, Lengths
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.goals import Via, held_goal, is_isolated
 from hovi.planning.problem.limits import Limits, as_limits
@@ -163,22 +163,24 @@ class Job:
         """The job on another grid."""
         return dataclasses.replace(self, grid=grid)
 
-    def lasting(self, clock: Clock, length: float, grid: Grid | None = None) -> Self:
-        """The job on a grid whose free part has another length, in [s]; on its own if None.
+    def lasting(
+        self, clock: Clock, lengths: Lengths, now: Lengths | None = None, grid: Grid | None = None
+    ) -> Self:
+        """The job with other lengths of its free parts, in [s], on a grid for them.
 
         Goals of segments and limits move along with the ends of the segments.
+        now: the lengths of the job's own parts; that of a single one follows from its grid.
+        grid: its own one for the new lengths if None.
         """
-        longer = self.on(clock.grid(self.grid if grid is None else grid, length))
+        now = clock.length(self.grid) if now is None else now
+        longer = self.on(clock.grid(self.grid, now, lengths) if grid is None else grid)
         if not self.segments:
             return longer
-        now, limits = clock.length(self.grid), self.options.limits
-        ends = clock.times(np.array(self.ends), now, length)
+        limits, ends = self.options.limits, clock.times(np.array(self.ends), now, lengths)
         fractions = (*(ends / longer.grid.duration).tolist(), 1.0)
-        times = clock.times(np.array([each.time for each in self.options.via]), now, length)
-        via = zip(self.options.via, times.tolist(), strict=True)
-        changes: dict[str, Any] = {"via": [dataclasses.replace(x, time=t) for x, t in via]}
-        if isinstance(limits, Limits) and limits.parts:
-            changes["limits"] = Limits.of_segments(limits.parts, ends.tolist())
+        changes: dict[str, Any] = {"via": clock.via(self.options.via, now, lengths)}
+        if isinstance(limits, Limits):
+            changes["limits"] = clock.limits(limits, now, lengths)
         own = zip(self.segments, fractions, strict=True)
         segments = tuple(dataclasses.replace(each, end=end) for each, end in own)
         return dataclasses.replace(longer.with_options(**changes), segments=segments)

@@ -8,6 +8,9 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable
 
+import numpy as np
+import numpy.typing as npt
+
 from hovi.discrete.grid import DiscretePath, Grid
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.problem.tolerance import LAST_BARRIER
@@ -27,6 +30,7 @@ from hovi.planning.solver.free_duration.timed_path import TimePrice
 from hovi.planning.solver.solver import Solution
 from hovi.planning.solver.status import Status
 
+Array = npt.NDArray[np.float64]
 OnGrid = Callable[[Grid], SolveFor]
 """Returns a solver on a grid, scaled to each duration."""
 JointSolve = Callable[[Solution], Solution | None]
@@ -54,7 +58,8 @@ _BEST = "The best duration is"
 
 
 def joint_minimum(
-    free: FreeDuration,
+    price: TimePrice,
+    lengths: Array,
     problem: TrajectoryProblem,
     path: DiscretePath,
     max_iterations: int,
@@ -62,18 +67,18 @@ def joint_minimum(
     near: bool = False,
     barrier: float = LAST_BARRIER,
 ) -> Solution | None:
-    """A minimum in the motion and the duration, or the best motion if the solve was stopped.
+    """A minimum in the motion and lengths of parts, or the best motion if the solve was stopped.
 
     None for a problem that does not support it, or if no minimum was found.
     near: whether the path nearly is a solution. Other arguments as of `solve_jointly`.
     """
-    if not solves_jointly(problem, near):
+    if not solves_jointly(problem, price.clock, lengths, near):
         return None
-    price = TimePrice(free.weight, free.lower, free.upper)
     found = solve_jointly(
         problem,
         path,
         price,
+        lengths,
         max_iterations=max_iterations,
         time_limit=time_limit,
         near=near,

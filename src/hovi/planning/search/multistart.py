@@ -141,7 +141,9 @@ def _solve(
     if free is not None:
         from hovi.planning.search.joint_duration import joint_minimum  # rarely needed
 
-        solution = joint_minimum(free, problem, guess, most, time_limit, barrier=job.barrier)
+        now = np.array([free.clock.length(problem.grid)])
+        known = free.price, now, problem, guess, most, time_limit
+        solution = joint_minimum(*known, barrier=job.barrier)
     if solution is None:
         solution = solve_on_grid(
             problem,

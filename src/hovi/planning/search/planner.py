@@ -361,7 +361,7 @@ def _time(
         if options.time_weight != 0:
             raise InputError("time_weight needs a free duration: give a pair (lower, upper).")
         return None, T
-    clock = Clock(max(stops_of(options), default=0.0))
+    clock = Clock((max(stops_of(options), default=0.0), 0.0))
     if clock.before >= T[0]:
         raise InputError(
             f"a via point or condition at {clock.before:g} s is not before the least duration, "

@@ -33,6 +33,7 @@ from hovi.planning.solver.point_outputs import PointOutputs
 from hovi.scene.lagrangian import PointTerms, over_time
 
 Array = npt.NDArray[np.float64]
+Index = npt.NDArray[np.intp]
 
 
 class BoundedAction(BoundedObjective[DiscretePath]):
@@ -361,10 +362,9 @@ class BoundedAction(BoundedObjective[DiscretePath]):
     def stretched(self, problem: TrajectoryProblem) -> Self:
         """The same bounded action for another duration of its problem, without a model yet.
 
-        Bounds and the pattern of the Hessian stay; weights are proportional to the duration T.
+        Bounds and the pattern of the Hessian stay; weights are proportional to the steps.
         """
-        T = problem.grid.duration
-        ratio = T / self.problem.grid.duration
+        steps = problem.grid.steps / self.problem.grid.steps
         other = copy.copy(self)
         other.problem, own = problem, self.action
         other.action = ActionObjective(
@@ -372,15 +372,23 @@ class BoundedAction(BoundedObjective[DiscretePath]):
         )
         other.ld, other.lagrangian = other.action.ld, other.action.lagrangian
         lower, upper, weights = self._at_points
-        other._at_points = lower, upper, ratio * weights
+        at_points = steps[np.concatenate(self.ld.point_intervals)]
+        other._at_points = lower, upper, at_points[:, None] * weights
         other._predicted = None
         if self.rows is not None:
             other.rows = self.rows.stretched(problem.grid)
             other._row_weights = other.rows.weights
             other._row_columns = other.rows.columns(own.coordinates)
-        weights = ratio * self.bounds.weights
+        weights, T = steps[self.output_intervals] * self.bounds.weights, problem.grid.duration
         other.bounds = dataclasses.replace(self.bounds, weights=weights, measure=T)
         return other
+
+    @property
+    def output_intervals(self) -> Index:
+        """The interval of every output, shape (R,)."""
+        at_points = np.concatenate(self.ld.point_intervals)
+        rows = np.zeros(0, np.intp) if self.rows is None else self.rows.intervals
+        return np.append(np.repeat(at_points, self._point_count // self._points), rows)
 
     def plain(self, ordered: Array) -> Array:
         """Values of outputs at the points, then of rows of limits, then of distances."""

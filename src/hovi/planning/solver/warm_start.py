@@ -11,7 +11,6 @@ from hovi.optimize.banded_model import BandModel
 from hovi.optimize.quadratic_model import QuadraticModel
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.action_objective import ActionObjective
-from hovi.planning.solver.free_duration.timed_path import columns_of_ends
 from hovi.schemes.scheme import regular_from_nodal
 
 Array = npt.NDArray[np.float64]
@@ -59,7 +58,8 @@ def _columns(objective: ActionObjective, old: DiscretePath, ends: Ends) -> Array
     dq = problem.coordinates.difference(old.q[[0, -1]], ends[0])
     rates = [new - old.rates[[0, -1], j] for j, new in enumerate(ends[1:])]
     nodes = np.stack([dq, *rates], axis=1) * (h[:, None] ** np.arange(k))[:, :, None]
-    change = columns_of_ends(nodes, problem)
+    change = np.zeros((problem.grid.intervals, problem.ld.columns, nodes.shape[2]))
+    change[0, :k], change[-1, k : 2 * k] = nodes
     if objective.coordinates == "regular":
         change[[0, -1], : 2 * k] = regular_from_nodal(0, k) @ change[[0, -1], : 2 * k]
     return change

@@ -1,14 +1,16 @@
-"""The derivatives of a discrete action in the logarithm of its duration.
+"""The derivatives of a discrete action in the logarithms of lengths of free parts.
 
-The unknowns are the columns (q, h q', ..., c) of the intervals and s = log T. With the columns
-fixed, the jet at a point is y = (q, q', ..., q^(k)) with y_j proportional to T^-j, so that
-y' = dy/ds has the parts -j y_j and y'' the parts j^2 y_j, and the weights h w grow like T. With the
-gradient g and the Hessian H of L at the points, all sums over the points,
+The unknowns are the columns (q, h q', ..., c) of the intervals and s = log L of every part, L its
+length. With the columns fixed, the jet at a point of the part is y = (q, q', ..., q^(k)) with y_j
+proportional to L^-j, so that y' = dy/ds has the parts -j y_j and y'' the parts j^2 y_j, and the
+weights h w grow like L. With the gradient g and the Hessian H of the Lagrangian l at the points,
+all sums over the points of the part,
 
-    dS/ds = h w (L + g.y'),   d2S/ds2 = h w (L + 2 g.y' + y'.H y' + g.y''),
+    dS/ds = h w (l + g.y'),   d2S/ds2 = h w (l + 2 g.y' + y'.H y' + g.y''),
 
 and the derivative of the gradient in the columns is that of h w with (1 - j) g_j + (H y')_j for g.
-The columns of fixed ends, such as h v0, change with T themselves: by the chain rule.
+What is kept where parts begin and end, such as v0 in h v0, has columns that change with L
+themselves: by the chain rule. No point depends on two lengths.
 """
 
 from __future__ import annotations
@@ -25,40 +27,44 @@ from hovi.scene.lagrangian import PointExpansion, PointTerms
 from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
+Mask = npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
 class DurationBorder:
-    """Derivatives of the action in s = log T.
+    """Derivatives of the action in s = log L of the part of every interval.
 
-    slope: dS/ds. column: d2S/ds dx of the columns x of every interval, shape (N, m, n).
-    corner: d2S/ds2.
+    slope: dS/ds, what every interval adds, shape (N,). column: d2S/ds dx of its columns x, shape
+    (N, m, n). corner: d2S/ds2, what it adds, (N,). All are zero where no part is.
     """
 
-    slope: float
+    slope: Array
     column: Array
-    corner: float
+    corner: Array
 
-    def with_ends(self, expansion: Expansion, change: Array, order: int) -> DurationBorder:
-        """The derivatives if columns of fixed ends change with s, too.
+    def with_ends(
+        self, expansion: Expansion, kept: Array, unknown: Array, order: int
+    ) -> DurationBorder:
+        """The derivatives if columns of what is kept change with s, too: see `kept_columns`.
 
-        change: u_j = j x_j = dx_j/ds of the columns x_j = h^j q^(j), zero elsewhere, shape
-        (N, m, n); the second derivative is j u_j. order: k.
+        kept: u_j = j x_j = dx_j/ds of the columns x_j = h^j q^(j), zero elsewhere, shape (N, m, n);
+        the second derivative is j u_j. unknown: j where q^(j) is an unknown, zero elsewhere: its
+        steps change as much. order: k.
         """
         g, j = expansion.gradient, np.arange(order)
-        bend = np.zeros_like(change)
-        bend[:, : 2 * order] = np.tile(j, 2)[:, None] * change[:, : 2 * order]
-        moved = np.zeros_like(change)
-        for i in {0, len(change) - 1}:
-            moved[i] = np.einsum("abij,bj->ai", expansion.hessian[i], change[i])
-        twice = float(np.vdot(2 * self.column + moved, change)) + float(np.vdot(g, bend))
-        slope = self.slope + float(np.vdot(g, change))
-        return DurationBorder(slope, self.column + moved, self.corner + twice)
+        bend = np.zeros_like(kept)
+        bend[:, : 2 * order] = np.tile(j, 2)[:, None] * kept[:, : 2 * order]
+        moved = np.zeros_like(kept)
+        for i in np.flatnonzero(kept.any(axis=(1, 2))):
+            moved[i] = np.einsum("abij,bj->ai", expansion.hessian[i], kept[i])
+        twice = _sums((2 * self.column + moved) * kept + g * bend)
+        column = self.column + moved + unknown * g
+        return DurationBorder(self.slope + _sums(g * kept), column, self.corner + twice)
 
 
 @dataclass(frozen=True, eq=False)
 class Forces:
-    """Terms of limits at the points of a batch, whose weights do not grow with T.
+    """Terms of limits at the points of a batch, whose weights do not grow with L.
 
     gradient: those in the expansion's gradient. multipliers: those that weight curvatures.
     """
@@ -77,28 +83,30 @@ def duration_border(
     ld: DiscreteLagrangian,
     expansion: Expansion,
     jets: list[Jet],
+    inside: Mask,
     forces: Sequence[Forces | None] | None = None,
 ) -> DurationBorder:
     """The derivatives with all columns fixed.
 
     expansion: in nodal columns, with those at the points. jets: of the same path.
-    forces: of limits, per batch; none if None.
+    inside: which intervals belong to a part, (N,). forces: of limits, per batch; none if None.
     """
     assert expansion.points is not None
     column = np.zeros_like(expansion.gradient)
-    slope = corner = 0.0
+    slope, corner = np.zeros(len(column)), np.zeros(len(column))
     for i, (batch, jet, point) in enumerate(zip(ld.batches, jets, expansion.points, strict=True)):
-        weights = ld.point_weights[i]
+        weights, numbers = ld.point_weights[i], ld.point_intervals[i]
         at_points = _at_points(point, jet, None if forces is None else forces[i])
-        slope += float(weights @ at_points[0])
-        corner += float(weights @ at_points[2])
+        slope += np.bincount(numbers, weights * at_points[0], len(slope))
+        corner += np.bincount(numbers, weights * at_points[2], len(corner))
         gradient = at_points[1].reshape(len(weights), ld.k + 1, -1)
         if expansion.charts is not None:
             part = expansion.charts[i].nodal_gradient(gradient)
         else:
             part = batch.contracted(gradient, "nodal")
         column[batch.index, : part.shape[1]] = part
-    return DurationBorder(slope, column, corner)
+    column[~inside] = 0.0
+    return DurationBorder(inside * slope, column, inside * corner)
 
 
 def _at_points(
@@ -117,6 +125,11 @@ def _at_points(
     column = (1.0 - j) * own - j * force + bent
     corner = point.value + np.vecdot(2.0 * own + bent, first) - np.vecdot(own + force, j * first)
     return slope, column, corner
+
+
+def _sums(columns: Array) -> Array:
+    """Of every interval, shape (N,)."""
+    return np.asarray(columns.sum(axis=(1, 2)))
 
 
 def _pulled(terms: PointTerms, point: PointExpansion) -> Array:

@@ -1,18 +1,20 @@
-"""solve_jointly: a motion and its duration, by one solve."""
+"""solve_jointly: a motion and the lengths of its free parts, such as its duration, by one solve."""
 
 from __future__ import annotations
 
 import dataclasses
-import math
 import time
 
 import numpy as np
+import numpy.typing as npt
 
-from hovi.discrete.grid import DiscretePath
+from hovi.discrete.grid import DiscretePath, Grid
 from hovi.optimize.criteria import Criteria
 from hovi.optimize.ended import Ended, Reason
 from hovi.optimize.start import Start
 from hovi.optimize.trust_region import minimize
+from hovi.planning.conditions.condition import Equation
+from hovi.planning.problem.clock import Clock
 from hovi.planning.problem.contradictions import contradiction
 from hovi.planning.problem.limits import Limits, no_limits
 from hovi.planning.problem.problem import TrajectoryProblem
@@ -31,32 +33,45 @@ from hovi.system.blas_threads import one_blas_thread
 from hovi.system.deadline import Deadline, OutOfTimeError
 from hovi.system.interruption import interruptible
 
+Array = npt.NDArray[np.float64]
+Index = npt.NDArray[np.intp]
 
-def solves_jointly(problem: TrajectoryProblem, near: bool) -> bool:
-    """Whether the duration can be an unknown of a problem's motion.
 
-    Where more depends on it than the action and the limits, it cannot: functions of time, obstacles
-    that move, via points, segments and equations with times of their own, passive torques, and
-    velocities asked for at the goal. Limits on the torque rate are imposed after a first solve, a
-    start is led back inside its limits in a time of its own, and many intervals need the merge
-    tree. Equations and distances are followed from a motion that nearly is a solution.
-    near: whether the guess is one.
+def solves_jointly(problem: TrajectoryProblem, clock: Clock, lengths: Array, near: bool) -> bool:
+    """Whether lengths of parts can be unknowns of a problem's motion.
+
+    Where more depends on them than the action and the limits, they cannot: functions of time,
+    obstacles that move, passive torques, and velocities asked for at the goal. Limits on the torque
+    rate are imposed after a first solve, a start is led back inside its limits in a time of its
+    own, and many intervals need the merge tree. Equations and distances are followed from a motion
+    that nearly is a solution.
+    clock: which parts. lengths: those of the problem, in [s]. near: whether the guess is a solution
+    nearly.
     """
     equations, distances, limits = problem.equations, problem.distances, problem.limits
-    last = problem.grid.intervals
-    if problem.periodic or problem.via or len(problem.passive) > 0:
+    if problem.periodic or len(problem.passive) > 0:
         return False
-    if problem.ld.segments is not None or last > MAX_BAND_INTERVALS:
+    if problem.grid.intervals > MAX_BAND_INTERVALS or (problem.ld.k == 1 and not clock.whole):
         return False
-    if problem.ld.lagrangian.timed or any(each.timed for each in problem.bounds):
+    timed = any(each.timed for each in problem.ld.lagrangians)
+    if timed or any(each.timed for each in problem.bounds):
         return False
     if limits is not None and (limits.on_torque_rate or limits.excused):
         return False
-    if any(each.y.needs - {"q"} or each.where.node < last for each in equations):
+    nodes = clock.nodes(problem.grid, lengths)
+    if not all(_stays(each, problem.grid, nodes) for each in equations):
         return False
     if distances is not None and (distances.paths or not takes_rows(problem)):
         return False
     return near or (not equations and distances is None)
+
+
+def _stays(equation: Equation, grid: Grid, nodes: Index) -> bool:
+    """Whether an equation means the same for all lengths of parts with these nodes, (p, 2)."""
+    node = equation.where.node
+    inside = ((nodes[:, 0] < node) & (node < nodes[:, 1])).any()
+    moves = node in (0, grid.intervals) and node in nodes  # velocities there change with L
+    return not inside and not (moves and equation.y.needs - {"q"})
 
 
 @one_blas_thread
@@ -65,6 +80,7 @@ def solve_jointly(
     problem: TrajectoryProblem,
     path: DiscretePath,
     price: TimePrice,
+    lengths: Array,
     *,
     max_iterations: int = 500,
     time_limit: float | None = None,
@@ -72,17 +88,18 @@ def solve_jointly(
     near: bool = False,
     barrier: float = LAST_BARRIER,
 ) -> Solution:
-    """A motion x and a duration T that minimise S(x, T) + w T, with T between bounds.
+    """A motion x and lengths L of parts that minimise S(x, L) + w sum L, with L between bounds.
 
-    n_neg counts the duration among the unknowns, unless it is at a bound. The cost is S, with the
-    price of time if the problem has one; the solution's problem is that of its duration. At a limit
+    n_neg counts lengths among the unknowns, unless they are at bounds. The cost is S, with the
+    price of time if the problem has one; the solution's problem is that of its lengths. At a limit
     it is the best motion so far.
 
-    problem: one that `solves_jointly`, for any duration. path: the guess, for this duration.
-    price: of time, and the bounds of T. Other arguments as of `solve_on_grid`.
+    problem: one that `solves_jointly`, for any lengths. path: the guess, for the first ones.
+    price: of time, and the bounds of L. lengths: those of the problem, in [s], shape (p,). Other
+    arguments as of `solve_on_grid`.
     """
     began = time.perf_counter()
-    first, guess = _within(problem, path, price)
+    first, guess, lengths = _within(problem, path, price, lengths)
     criteria = Criteria(
         decrease=STATIONARY_DECREASE,
         max_iterations=max_iterations,
@@ -93,34 +110,38 @@ def solve_jointly(
     )
     if problem.limited or problem.constrained:
         limits = problem.limits or no_limits(problem.coordinates)
-        result = _limited(first, limits, Start(guess, near=near), price, criteria)
+        result = _limited(first, limits, Start(guess, near=near), price, lengths, criteria)
     else:
-        result = _unlimited(first, guess, price, criteria)
+        result = _unlimited(first, guess, price, lengths, criteria)
     return solution_of(result, 0.0, time.perf_counter() - began)
 
 
 def _within(
-    problem: TrajectoryProblem, path: DiscretePath, price: TimePrice
-) -> tuple[TrajectoryProblem, DiscretePath]:
-    """The problem and the guess for the nearest duration within the bounds."""
-    before = problem.grid.duration
-    T = float(np.clip(before, price.lower, price.upper))
-    if before == T:
-        return problem, problem.moved(path)
-    first = problem.on(problem.grid.stretched(T))
-    return first, first.moved(stretched_path(path, T / before))
+    problem: TrajectoryProblem, path: DiscretePath, price: TimePrice, before: Array
+) -> tuple[TrajectoryProblem, DiscretePath, Array]:
+    """The problem and the guess for the nearest lengths within the bounds, and these."""
+    lengths, clock = np.clip(before, price.lower, price.upper), price.clock
+    if np.allclose(lengths, before, rtol=1e-12, atol=0.0):
+        return problem, problem.moved(path), lengths
+    first = problem.lasting(clock, before, lengths)
+    moved = first.moved(stretched_path(path, problem.grid, clock, before, lengths))
+    return first, moved, lengths
 
 
 def _unlimited(
-    problem: TrajectoryProblem, guess: DiscretePath, price: TimePrice, criteria: Criteria
+    problem: TrajectoryProblem,
+    guess: DiscretePath,
+    price: TimePrice,
+    lengths: Array,
+    criteria: Criteria,
 ) -> Answer:
     """By the trust region."""
-    objective = TimedAction(problem, price)
-    ended = minimize(objective, Start(TimedPath(guess, problem.grid.duration)), criteria)
+    objective = TimedAction(problem, price, lengths)
+    ended = minimize(objective, Start(TimedPath(guess, lengths)), criteria)
     n_neg = 0 if ended.convex else _negative_eigenvalues(objective, ended)
-    T, path = ended.x.duration, ended.x.path
-    final = problem.on(problem.grid.stretched(T))
-    cost = ended.value - price.weight * T + price_of_time(final)
+    path = ended.x.path
+    final = problem.lasting(price.clock, lengths, ended.x.lengths)
+    cost = ended.value - price.of(ended.x.lengths) + price_of_time(final)
     nit, at_end = len(ended.steps), Ended(path, ended.outputs, None, ended.why)
     status, message = status_of(final, at_end, cost, nit, n_neg)
     message += chart_sentence(final, path)
@@ -133,26 +154,29 @@ def _limited(
     limits: Limits,
     start: Guess,
     price: TimePrice,
+    lengths: Array,
     criteria: Criteria,
 ) -> Answer:
-    """By the interior point, unless limits and ends contradict each other for all durations."""
-    longest = problem.on(problem.grid.stretched(price.upper))
+    """By the interior point, unless limits and ends contradict each other for all lengths."""
+    longest = problem.lasting(price.clock, lengths, price.upper)
     reason = contradiction(longest, limits)
     if reason:
         message = f"no motion within the limits was found: {reason}."
         return Answer.at(problem, start.x, Status.INFEASIBLE, message)
     deadline = Deadline(criteria.time_limit)
-    found = minimum_within_limits(problem, limits, start, price, criteria)
-    T = found.problem.grid.duration
-    inside = all(not math.isclose(T, x, rel_tol=1e-12) for x in (price.lower, price.upper))
-    if inside or found.status is not Status.MINIMUM:
+    found, lengths = minimum_within_limits(problem, limits, start, price, lengths, criteria)
+    bounds = np.stack([price.lower, price.upper])
+    kept = np.any(np.isclose(lengths, bounds, rtol=1e-12, atol=0.0), axis=0)
+    if not kept.any() or found.status is not Status.MINIMUM:
         return found
-    # as for a given duration: the barrier was relative to the cost with the price of time
-    again = InteriorPoint().minimize(
-        found.problem,
-        Start(found.path, found.central, near=True),
-        dataclasses.replace(criteria, time_limit=deadline.seconds_left),
-    )
+    # as for given lengths: the barrier was relative to the cost with their price
+    near = Start(found.path, found.central, near=True)
+    criteria = dataclasses.replace(criteria, time_limit=deadline.seconds_left)
+    if kept.all():
+        again = InteriorPoint().minimize(found.problem, near, criteria)
+    else:
+        others = price.with_given(lengths, kept)
+        again = _limited(found.problem, limits, near, others, lengths[~kept], criteria)
     steps, history = found.nit + again.nit, [*found.history, *again.history]
     best = again if again.status is Status.MINIMUM else found
     return dataclasses.replace(best, nit=steps, history=history)

@@ -1,4 +1,4 @@
-"""The action plus the price of time under limits, with the duration as one more unknown."""
+"""The action plus the price of time under limits, with lengths of parts as further unknowns."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from hovi.optimize.ended import Outputs
 from hovi.optimize.quadratic_model import QuadraticModel
 from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.bounded_action import BoundedAction
-from hovi.planning.solver.free_duration.duration_border import Forces, stretch_of
+from hovi.planning.solver.free_duration.duration_border import Forces
 from hovi.planning.solver.free_duration.row_border import RowForces
 from hovi.planning.solver.free_duration.timed_model import TimedModel, moved_in_time
 from hovi.planning.solver.free_duration.timed_path import (
@@ -20,59 +20,67 @@ from hovi.planning.solver.free_duration.timed_path import (
 )
 
 Array = npt.NDArray[np.float64]
+Index = npt.NDArray[np.intp]
 
 DURATION_METRIC = 400.0
-"""Entry of log T in the metric: with the first radius of 20 it may change by 1, since only longer
+"""Entry of log L in the metric: with the first radius of 20 it may change by 1, since only longer
 motions may be within the limits at all."""
 
 
 class TimedBoundedAction(BoundedObjective[TimedPath]):
-    """S(x, T) + w T in the columns x of the path and log T, with bounded outputs.
+    """S(x, L) + w sum L in the columns x of the path and log L, with bounded outputs.
 
-    The points have the weights h w of the first duration T0: those of the barrier do not depend on
-    the unknowns, and the forces of limits count T0 / T times in the integral over T. Where
-    distances are least does not change with T: their rows stay where they are in their intervals.
+    The points have the weights h w of the first lengths L0: those of the barrier do not depend on
+    the unknowns, and the forces of limits count L0 / L times in the integral over a part. Where
+    distances are least does not change with L: their rows stay where they are in their intervals.
 
-    first: the action with the bounds, in nodal coordinates, for the duration T0; its expansions
-    keep those at the points from now on. price: of time.
+    first: the action with the bounds, in nodal coordinates, for the lengths L0; its expansions
+    keep those at the points from now on. price: of time. lengths: L0, in [s].
     """
 
     radii = 20.0, 20.0  # a long step in time leads to another motion
 
-    def __init__(self, first: BoundedAction, price: TimePrice) -> None:
+    def __init__(self, first: BoundedAction, price: TimePrice, lengths: Array) -> None:
         first.action.keep_points = True
-        self.first, self.price = first, price
+        self.first, self.price, self.lengths = first, price, lengths
         self.bounds, self.reopens = first.bounds, first.reopens
-        self._at: dict[float, BoundedAction] = {}
+        self._at: dict[bytes, BoundedAction] = {}
         self._slopes: list[Array] = []
         self._terms: tuple[Array, Array, Array] | None = None
         self._last = first  # that of the last model
-        self._rates = np.zeros(0)  # d outputs / d log T, (R,)
+        self._rates = np.zeros(0)  # d outputs / d log L of their parts, (R,)
 
-    def at(self, duration: float) -> BoundedAction:
-        """The bounded action for a duration, in [s]; the first and the last two are kept."""
-        if duration == self.first.problem.grid.duration:
+    def at(self, lengths: Array) -> BoundedAction:
+        """The bounded action for lengths, in [s]; the first and the last two are kept."""
+        if np.array_equal(lengths, self.lengths):
             return self.first
-        if duration not in self._at:
+        key = lengths.tobytes()
+        if key not in self._at:
             if len(self._at) > 1:
                 del self._at[next(iter(self._at))]
-            self._at[duration] = _stretched(self.first, duration)
-        found = self._at[duration]
+            self._at[key] = self._stretched(self.first, self.lengths, lengths)
+        found = self._at[key]
         found.action.multipliers = self.first.action.multipliers
         return found
 
-    def action(self, duration: float) -> ActionObjective:
-        """The action for a duration, in [s]."""
-        return self.at(duration).action
+    def action(self, lengths: Array) -> ActionObjective:
+        """The action for lengths, in [s]."""
+        return self.at(lengths).action
 
-    def fraction(self, duration: float) -> float:
-        """T0 / T, by which the forces of limits count in the integral over T."""
-        return self.first.problem.grid.duration / duration
+    @property
+    def parts(self) -> Index:
+        """The part of every output, -1 for none, shape (R,)."""
+        parts = self.price.clock.parts(self.first.problem.grid, self.lengths)
+        return parts[self.first.output_intervals]
+
+    def fraction(self, lengths: Array) -> Array:
+        """L0 / L, or 1 outside of parts, by which forces of limits count in the integral, (R,)."""
+        return np.append(self.lengths / lengths, 1.0)[self.parts]
 
     def outputs(self, x: TimedPath) -> Outputs:
-        """S + w T, and the bounded outputs relative to their ranges."""
-        found = self.at(x.duration).outputs(x.path)
-        return Outputs(found.value + self.price.weight * x.duration, found.y)
+        """S + w sum L, and the bounded outputs relative to their ranges."""
+        found = self.at(x.lengths).outputs(x.path)
+        return Outputs(found.value + self.price.of(x.lengths), found.y)
 
     @property
     def may_be_concave(self) -> bool:
@@ -81,7 +89,7 @@ class TimedBoundedAction(BoundedObjective[TimedPath]):
 
     def model(self, x: TimedPath, sigma: Array, rho: Array, multipliers: Array) -> TimedModel:
         """The bordered model with the terms of the bounds: see BoundedObjective.model."""
-        at, fraction = self.at(x.duration), self.fraction(x.duration)
+        at, fraction = self.at(x.lengths), self.fraction(x.lengths)
         at.predict(self._slopes)
         self._terms = sigma, rho, multipliers
         inner = at.model(x.path, fraction * sigma, fraction * rho, fraction * multipliers)
@@ -89,39 +97,42 @@ class TimedBoundedAction(BoundedObjective[TimedPath]):
 
     def model_without_concavity(self, x: TimedPath) -> QuadraticModel | None:
         """See BoundedObjective."""
-        inner = self.at(x.duration).model_without_concavity(x.path)
+        inner = self.at(x.lengths).model_without_concavity(x.path)
         return None if inner is None else self._bordered(x, inner)
 
     def _bordered(self, x: TimedPath, inner: QuadraticModel) -> TimedModel:
-        """The model in the path and log T from that in the path, with the last terms."""
+        """The model in the path and log L from that in the path, with the last terms."""
         assert self._terms is not None
-        at, fraction = self.at(x.duration), self.fraction(x.duration)
+        at, fraction = self.at(x.lengths), self.fraction(x.lengths)
         rows, self._last = at.rows, at
         assert rows is not None
         gradient, force = (at.forces(x.path, fraction * each) for each in self._terms[1:])
         forces = [Forces(*each) for each in zip(gradient, force, strict=True)]
         weights, own = at.plain(self.bounds.weights), at.row_outputs
         weighted = ((weights * at.plain(each))[own] for each in self._terms)
-        of_rows = RowForces(rows, rows.columns("nodal"), rows.values(x.path), *weighted)
+        inside = self.price.clock.parts(at.problem.grid, x.lengths) >= 0
+        of_rows = RowForces(rows, inside, rows.columns("nodal"), rows.values(x.path), *weighted)
         model = TimedModel(at.action, x, inner, self.price, DURATION_METRIC, forces, of_rows)
         self._rates = self._rates_of(at, model, of_rows)
         return model
 
     def _rates_of(self, at: BoundedAction, model: TimedModel, rows: RowForces) -> Array:
-        """Derivatives of the outputs in log T, (R,)."""
-        plain = np.append(at.push_jets([stretch_of(jet) for jet in model.jets]), rows.slopes)
+        """Derivatives of the outputs in log L of their parts, (R,)."""
+        plain = np.append(at.push_jets(model.stretches), rows.slopes)
         rates = at.ordered(np.append(plain, np.zeros(len(self.bounds.weights) - len(plain))))
-        return rates if model.ends is None else rates + at.push_columns(model.ends)
+        return rates + at.push_columns(model.kept) if model.kept.any() else rates
 
     def push(self, step: Array, model: QuadraticModel) -> Array:
         """First-order change of the bounded outputs, shape (R,)."""
-        return self._last.push_columns(model.gather(step)) + float(step[-1]) * self._rates
+        stretch = np.append(step[-len(self.lengths) :], 0.0)[self.parts]
+        return self._last.push_columns(model.gather(step)) + stretch * self._rates
 
     def pull(self, forces: Array, model: QuadraticModel) -> Array:
-        """Gradient of sum of weights (forces y) in the columns and log T."""
+        """Gradient of sum of weights (forces y) in the columns and log L."""
         assert isinstance(model, TimedModel)
-        columns = self._last.pull(self.fraction(model.x.duration) * forces, model.inner)
-        return np.append(columns, np.vdot(self.bounds.weights * forces, self._rates))
+        columns = self._last.pull(self.fraction(model.x.lengths) * forces, model.inner)
+        slopes = self.bounds.weights * forces * self._rates
+        return np.append(columns, np.bincount(self.parts + 1, slopes, len(self.lengths) + 1)[1:])
 
     def accept(self, step: Array, model: QuadraticModel) -> None:
         """Use the outputs that the step predicts as weights of the next model's curvature."""
@@ -130,38 +141,39 @@ class TimedBoundedAction(BoundedObjective[TimedPath]):
 
     def hold(self, x: TimedPath, change: Array) -> float:
         """See BoundedObjective.hold."""
-        action = self.action(x.duration)
+        action = self.action(x.lengths)
         added = action.hold(x.path, change)
         self.first.action.multipliers = action.multipliers
         return added
 
     def satisfies_equations(self, x: TimedPath) -> bool:
         """Whether equations hold to their tolerances."""
-        return self.at(x.duration).satisfies_equations(x.path)
+        return self.at(x.lengths).satisfies_equations(x.path)
 
     def refine(self, x: TimedPath, level: float) -> Refinement | None:
         """Bound more of the motion: see BoundedAction."""
-        at = self.at(x.duration)
-        return self._refined(at, at.refine(x.path, level))
+        at = self.at(x.lengths)
+        return self._refined(x, at, at.refine(x.path, level))
 
     def refine_at_once(self, x: TimedPath) -> Refinement | None:
         """See BoundedObjective."""
-        at = self.at(x.duration)
-        return self._refined(at, at.refine_at_once(x.path))
+        at = self.at(x.lengths)
+        return self._refined(x, at, at.refine_at_once(x.path))
 
-    def _refined(self, at: BoundedAction, found: Refinement | None) -> Refinement | None:
-        """What was found at a duration, after the others take it over."""
+    def _refined(
+        self, x: TimedPath, at: BoundedAction, found: Refinement | None
+    ) -> Refinement | None:
+        """What was found at some lengths, after the others take it over."""
         if found is not None:
-            self.first = _stretched(at, self.first.problem.grid.duration)
+            self.first = self._stretched(at, x.lengths, self.lengths)
             self._at.clear()
             self.bounds, self.reopens = self.first.bounds, self.first.reopens
         return found
 
     def retract(self, x: TimedPath, step: Array, model: QuadraticModel) -> TimedPath:
-        """The motion in the new duration, then moved by the step in the columns."""
+        """The motion for the new lengths, then moved by the step in the columns."""
         return moved_in_time(self.action, self.price, x, step, model)
 
-
-def _stretched(action: BoundedAction, duration: float) -> BoundedAction:
-    """The same bounded action for another duration, in [s]."""
-    return action.stretched(stretched_problem(action.problem, duration))
+    def _stretched(self, action: BoundedAction, now: Array, lengths: Array) -> BoundedAction:
+        """The same bounded action for other lengths, in [s]. now: its own."""
+        return action.stretched(stretched_problem(action.problem, self.price.clock, now, lengths))

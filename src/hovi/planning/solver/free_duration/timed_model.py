@@ -1,4 +1,4 @@
-"""The quadratic model of a discrete action plus the price of time, in the path and log T."""
+"""The quadratic model of a discrete action plus the price of time, in the path and log L."""
 
 from __future__ import annotations
 
@@ -21,23 +21,24 @@ from hovi.planning.solver.free_duration.row_border import RowForces
 from hovi.planning.solver.free_duration.timed_path import (
     TimedPath,
     TimePrice,
-    columns_of_ends,
-    end_columns,
+    kept_columns,
     stretched_path,
 )
 
 Array = npt.NDArray[np.float64]
-ActionAt = Callable[[float], ActionObjective]
-"""The action for a duration, in [s]."""
+ActionAt = Callable[[Array], ActionObjective]
+"""The action for lengths of free parts, in [s]."""
 
 
 class TimedModel(BorderedModel):
     """The bordered model at a motion.
 
-    action: of its duration, whose last model was `inner`. x: the motion.
-    inner: the model in the path alone. price: of time. metric: entry of log T in the metric
+    action: for its lengths, whose last model was `inner`. x: the motion.
+    inner: the model in the path alone. price: of time. metric: entry of log L in the metric
     T^3 integral |da|^2, in which a motion of 1 rad between rests has the squared length 12.
     forces: of limits at the points, per batch; none if None. rows: of limits between them.
+    parts: the part of every interval, -1 for none, (N,). kept: columns that change with log L of
+    their part, to first order, (N, m, n). stretches: the same of the jets at the points, per batch.
     """
 
     def __init__(
@@ -54,32 +55,41 @@ class TimedModel(BorderedModel):
         self.action = action
         self.x = x
         self.expansion = action.expansion
-        self.jets = action.jets(x.path)
-        problem = action.problem
-        ends = end_columns(problem, x.path)
-        self.ends = None if ends is None else columns_of_ends(ends, problem)
-        known = duration_border(problem.ld, self.expansion, self.jets, forces)
+        jets, problem = action.jets(x.path), action.problem
+        self.parts = price.clock.parts(problem.grid, x.lengths)
+        inside = self.parts >= 0
+        self.stretches = [
+            inside[intervals, None] * stretch_of(jet)
+            for intervals, jet in zip(problem.ld.point_intervals, jets, strict=True)
+        ]
+        known = duration_border(problem.ld, self.expansion, jets, inside, forces)
         if rows is not None:
             known = rows.added_to(known)
-        if self.ends is not None:
-            known = known.with_ends(self.expansion, self.ends, problem.ld.k)
-        cost = price.weight * x.duration
+        self.kept, unknown = kept_columns(problem, x.path, price.clock, x.lengths)
+        if self.kept.any() or unknown.any():
+            known = known.with_ends(self.expansion, self.kept, unknown, problem.ld.k)
+        cost, own = price.weight * x.lengths, np.arange(len(x.lengths)) == self.parts[:, None]
+        columns = [inner.scatter(known.column * of[:, None, None]) for of in own.T]
         border = Border(
-            known.slope + cost,
-            inner.scatter(known.column),
-            known.corner + cost,
+            known.slope @ own + cost,
+            np.stack(columns, axis=1),
+            np.diag(known.corner @ own + cost),
             metric,
-            price.room(x.duration),
+            price.room(x.lengths),
         )
         super().__init__(inner, border)
 
+    def stretch(self, step: Array) -> Array:
+        """The change of log L of the part of every interval in a step, 0 without, (N,)."""
+        return np.append(step[self.size :], 0.0)[self.parts]
+
     def point_steps(self, step: Array) -> list[Array]:
         """Change of the jet at the points, to first order, (P, (k + 1) n) per batch."""
-        t, columns = float(step[-1]), self.gather(step)
-        if self.ends is not None:
-            columns += t * self.ends
-        changes = self.action.ld.point_steps(columns, "nodal", self.expansion)
-        return [dx + t * stretch_of(jet) for dx, jet in zip(changes, self.jets, strict=True)]
+        t, ld = self.stretch(step), self.action.ld
+        columns = self.gather(step) + t[:, None, None] * self.kept
+        changes = ld.point_steps(columns, "nodal", self.expansion)
+        parts = zip(changes, self.stretches, ld.point_intervals, strict=True)
+        return [dx + t[of, None] * dy for dx, dy, of in parts]
 
     def predicted_slopes(self, step: Array) -> list[Array]:
         """`output_slope` of the outputs that a step predicts, per batch."""
@@ -92,14 +102,20 @@ class TimedModel(BorderedModel):
 def moved_in_time(
     action: ActionAt, price: TimePrice, x: TimedPath, step: Array, model: QuadraticModel
 ) -> TimedPath:
-    """The motion after a step: stretched to its new duration, then moved in the columns.
+    """The motion after a step: stretched to its new lengths, then moved in the columns.
 
-    Fixed velocities at the ends are kept: their columns h v change with the duration.
+    What is kept where parts begin and end has columns that change with the lengths.
     """
-    T = price.after(x.duration, float(step[-1]))
-    problem, ratio = action(x.duration).problem, T / x.duration
-    fixed, j, columns = end_columns(problem, x.path), np.arange(problem.ld.k), model.gather(step)
-    if fixed is not None:
-        fixed *= ((ratio**j - 1.0) / np.maximum(j, 1))[:, None]
-        columns += columns_of_ends(fixed, problem)
-    return TimedPath(action(T).moved(stretched_path(x.path, ratio), columns), T)
+    before, clock = x.lengths, price.clock
+    lengths = price.after(before, step[-len(before) :])
+    problem = action(before).problem
+    ratios = clock.ratios(problem.grid, before, lengths)[:, None, None]
+    kept, unknown = kept_columns(problem, x.path, clock, before)
+    columns = model.gather(step) * ratios**unknown
+    at_ends = np.where(unknown > 0, 0.0, kept)  # `stretched_path` has the others
+    if at_ends.any():
+        orders = np.zeros((columns.shape[1], 1))
+        orders[: 2 * x.path.order, 0] = np.tile(np.arange(x.path.order), 2)
+        columns += (ratios**orders - 1.0) / np.maximum(orders, 1.0) * at_ends
+    path = stretched_path(x.path, problem.grid, clock, before, lengths)
+    return TimedPath(action(lengths).moved(path, columns), lengths)

@@ -1,4 +1,4 @@
-"""A path with its duration, and steps of both."""
+"""A path with the lengths of its free parts, and steps of both."""
 
 from __future__ import annotations
 
@@ -10,10 +10,13 @@ import numpy.typing as npt
 from hovi.checks.arguments import without_checks
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import DiscretePath, Grid
+from hovi.discrete.interval_paths import regularized_nodes
+from hovi.planning.problem.clock import Clock
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
+Mask = npt.NDArray[np.bool_]
 
 # called at each step
 _new_grid = without_checks(Grid)
@@ -21,90 +24,123 @@ _new_lagrangian = without_checks(DiscreteLagrangian)
 _new_path = without_checks(DiscretePath)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class TimePrice:
-    """The price of time and the bounds of a duration.
+    """The price of time, and the bounds of the lengths of the free parts of a motion.
 
-    weight: w, in cost per [s]. lower, upper: in [s].
+    weight: w, in cost per [s]. lower, upper: in [s], shape (p,). clock: which parts.
     """
 
     weight: float
-    lower: float
-    upper: float
+    lower: Array
+    upper: Array
+    clock: Clock = Clock()
 
-    def room(self, duration: float) -> tuple[float, float]:
-        """The least and the largest step of log T at a duration within the bounds, in [s]."""
-        low, high = np.log(self.lower / duration), np.log(self.upper / duration)
-        return min(float(low), 0.0), max(float(high), 0.0)
+    def with_given(self, lengths: Array, given: Mask) -> TimePrice:
+        """The price where some of the lengths are given, (p,) each."""
+        clock, free = self.clock.with_given(lengths, given), ~given
+        return TimePrice(self.weight, self.lower[free], self.upper[free], clock)
 
-    def after(self, duration: float, step: float) -> float:
-        """The duration after a step of its logarithm, in [s]; exactly a bound where it ends."""
-        low, high = self.room(duration)
-        if low < step < high:
-            return duration * float(np.exp(step))
-        return self.lower if step <= low else self.upper
+    def of(self, lengths: Array) -> float:
+        """w times the sum of the lengths."""
+        return self.weight * float(lengths.sum())
+
+    def room(self, lengths: Array) -> tuple[Array, Array]:
+        """The least and the largest steps of log L at lengths within the bounds, (p,) each."""
+        low, high = np.log(self.lower / lengths), np.log(self.upper / lengths)
+        return np.minimum(low, 0.0), np.maximum(high, 0.0)
+
+    def after(self, lengths: Array, step: Array) -> Array:
+        """The lengths after a step of their logarithms, in [s]; exactly bounds where it ends."""
+        low, high = self.room(lengths)
+        moved = np.where(step <= low, self.lower, self.upper)
+        return np.where((low < step) & (step < high), lengths * np.exp(step), moved)
 
 
 @dataclass(frozen=True, eq=False)
 class TimedPath:
-    """A path and its duration T, in [s], on a grid whose steps keep their proportions."""
+    """A path and the lengths L of its free parts, in [s], whose steps keep their proportions."""
 
     path: DiscretePath
-    duration: float
+    lengths: Array
 
 
-def stretched_problem(problem: TrajectoryProblem, duration: float) -> TrajectoryProblem:
-    """The problem for another duration, for solvers: its checks of the duration are not made.
+def stretched_problem(
+    problem: TrajectoryProblem, clock: Clock, now: Array, lengths: Array
+) -> TrajectoryProblem:
+    """The problem for other lengths of its free parts, for solvers: it is not checked.
 
-    For problems of which nothing but the discrete Lagrangian depends on the duration, and whose
+    For problems of which nothing but the discrete Lagrangian depends on the lengths, and whose
     conditions do not depend on time: the structure of the Hessian depends on the proportions of the
     steps alone.
     """
-    if duration == problem.grid.duration:
+    if np.array_equal(lengths, now):
         return problem
-    grid = _new_grid(problem.grid.steps * (duration / problem.grid.duration), problem.grid.schemes)
-    ld = _new_lagrangian(problem.ld.lagrangian, grid)
+    steps = problem.grid.steps * clock.ratios(problem.grid, now, lengths)
+    lagrangian = clock.lagrangian(problem.ld.lagrangian, now, lengths)
+    ld = _new_lagrangian(lagrangian, _new_grid(steps, problem.grid.schemes))
     stretched = copy.copy(problem)
     object.__setattr__(stretched, "ld", ld)
-    for name in ("torque_moments", "finer", "inertial_torque"):
+    for name in ("torque_moments", "finer", "inertial_torque", "structure"):
         stretched.__dict__.pop(name, None)
-    object.__setattr__(stretched, "structure", problem.structure)
+    if clock.whole:
+        object.__setattr__(stretched, "structure", problem.structure)
     return stretched
 
 
-def stretched_path(path: DiscretePath, ratio: float) -> DiscretePath:
-    """The same curve, run through in `ratio` times the duration; velocities at the ends, too."""
-    k = path.order
-    powers = ratio ** np.arange(1.0, k)
-    return _new_path(
-        path.q,
-        path.v / ratio,
-        path.z / ratio**k,
-        path.inner / ratio**k,
-        path.higher / powers[1:, None],
-    )
+def stretched_path(
+    path: DiscretePath, grid: Grid, clock: Clock, now: Array, lengths: Array
+) -> DiscretePath:
+    """The same curve, its free parts run through in other times.
 
-
-def end_columns(problem: TrajectoryProblem, path: DiscretePath) -> Array | None:
-    """j h^j q^(j) of the fixed components of both ends, shape (2, k, n); None at rest.
-
-    They are the derivatives of the ends' columns h^j q^(j) in log T, as q^(j) is given and h
-    proportional to T; all other columns are unknowns.
+    Velocities at the ends of the motion change, too; those at nodes where a part begins or ends
+    between others stay, which changes the curve next to them. grid: of the path. now: the lengths
+    of its parts, in [s].
     """
-    rates, k = path.rates[[0, -1]], problem.ld.k
-    if not rates.any():
-        return None
-    steps, j = problem.grid.steps[[0, -1]], np.arange(k)
-    columns = np.zeros((2, k, path.v.shape[1]))
-    columns[:, 1:] = rates
-    columns *= (j * steps[:, None] ** j)[:, :, None]
-    return np.where(problem.free_ends, 0.0, columns)
+    k, ratios = path.order, clock.ratios(grid, now, lengths)
+    nodes = clock.nodes(grid, now)
+    powers = ratios[:, None] ** np.arange(1.0, max(k, 2))  # (N, k - 1)
+    at_nodes = np.concatenate([powers, powers[-1:]])
+    inner = np.setdiff1d(nodes, [0, grid.intervals])
+    at_nodes[inner] = 1.0
+    rates = path.v[:, None] if k == 1 else path.rates
+    z = path.z / (ratios**k)[:, None, None]
+    for first, last in nodes:
+        kept = np.zeros((last - first + 1, k, rates.shape[2]))
+        for node, interval in {(first, first), (last, last - 1)}:
+            if node in inner:
+                kept[node - first, 1:] = rates[node] * (1.0 - 1.0 / powers[interval, :, None])
+        if kept.any():
+            part = slice(first, last)
+            z[part] += regularized_nodes(kept, (grid.steps * ratios)[part])
+    rates = rates / at_nodes[:, :, None]
+    modes = path.inner / (ratios**k)[:, None, None]
+    return _new_path(path.q, rates[:, 0], z, modes, rates[:, 1:] if k > 2 else path.higher)
 
 
-def columns_of_ends(ends: Array, problem: TrajectoryProblem) -> Array:
-    """The change of all columns, (N, m, n), for one of those of both ends, (2, k, n)."""
-    k = problem.ld.k
-    columns = np.zeros((problem.grid.intervals, problem.ld.columns, ends.shape[2]))
-    columns[0, :k] = ends[0]
-    columns[-1, k : 2 * k] = ends[1]
-    return columns
+def kept_columns(
+    problem: TrajectoryProblem, path: DiscretePath, clock: Clock, lengths: Array
+) -> tuple[Array, Array]:
+    """What is kept of q, q', ... where free parts begin and end as their lengths L change.
+
+    With the columns h^j q^(j) of an interval fixed, q^(j) changes with log L as h does; what is
+    kept has columns with the derivative j h^j q^(j) instead. That is all at a node between others,
+    and what is fixed at an end of the motion.
+    Returns j h^j q^(j) where it is kept, else 0, and j of those that are unknowns, else 0, shape
+    (N, m, n) each.
+    """
+    grid, k, j = problem.grid, problem.ld.k, np.arange(problem.ld.k)
+    kept = np.zeros((grid.intervals, problem.ld.columns, path.v.shape[1]))
+    unknown = np.zeros_like(kept)
+    for ends in clock.nodes(grid, lengths):
+        for side, node in enumerate(ends):
+            interval, columns = node - side, slice(side * k, side * k + k)
+            held = np.zeros((k, kept.shape[2]))
+            held[1:] = path.rates[node]
+            held *= (j * grid.steps[interval] ** j)[:, None]
+            if 0 < node < grid.intervals:
+                unknown[interval, columns] = j[:, None]
+            else:
+                held[problem.free_ends[side]] = 0.0
+            kept[interval, columns] = held
+    return kept, unknown

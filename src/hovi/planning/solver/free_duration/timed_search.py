@@ -1,13 +1,16 @@
-"""A motion within limits and its duration: the search of the interior point with both unknown.
+"""A motion within limits and the lengths of its parts: the interior point with both unknown.
 
 It makes limits hold between the points as for given durations: between two tightenings of bounds,
-or halvings of intervals, a solve moves the motion and the duration.
+or halvings of intervals, a solve moves the motion and the lengths.
 """
 
 from __future__ import annotations
 
 import dataclasses
 from functools import partial
+
+import numpy as np
+import numpy.typing as npt
 
 from hovi.discrete.grid import DiscretePath
 from hovi.optimize.barrier import Barrier
@@ -39,9 +42,11 @@ from hovi.planning.solver.status import Status, unfinished
 from hovi.system.dataclass import dataclass
 from hovi.system.deadline import raise_if_late
 
+Array = npt.NDArray[np.float64]
+
 LAST_DECREASE = 1e-11
-"""Relative decrease at which a motion and its duration are accurate: its square root is the
-relative error of the slope in the duration."""
+"""Relative decrease at which a motion and its lengths are accurate: its square root is the relative
+error of the slope in a length."""
 
 
 def minimum_within_limits(
@@ -49,17 +54,18 @@ def minimum_within_limits(
     limits: Limits,
     start: Guess,
     price: TimePrice,
+    lengths: Array,
     criteria: Criteria,
-) -> Answer:
-    """A motion and a duration of least S + w T within limits, from a guess for the problem's."""
-    lazy = takes_rows(problem)
-    search = TimedSearch(problem, limits, criteria, None, start, lazy=lazy, price=price)
-    return answered(partial(_searched, search), partial(_ended, search))
+) -> tuple[Answer, Array]:
+    """A motion of least S + w sum L within limits, from a guess for the problem's L; and its L."""
+    known = problem, limits, criteria, None, start
+    search = TimedSearch(*known, lazy=takes_rows(problem), price=price, lengths=lengths)
+    return answered(partial(_searched, search), partial(_ended, search)), search.lengths
 
 
 @dataclass(eq=False)
 class TimedSearch(BoundedSearch):
-    """A search in which every solve moves the duration, too: the problem is that of the last one.
+    """A search in which every solve moves the lengths, too: the problem is that of the last ones.
 
     price: of time.
     """
@@ -68,13 +74,13 @@ class TimedSearch(BoundedSearch):
     price: TimePrice = dataclasses.field(kw_only=True)
 
     def solve(self, start: Begun) -> Bounded:
-        """Solve with bounds at the quadrature points, from the problem's duration."""
+        """Solve with bounds at the quadrature points, from the problem's lengths."""
         raise_if_late()
-        problem, criteria = self.problem, self.remaining_criteria()
-        known = self.known_multipliers(start.x)
-        objective = TimedBoundedAction(self.objective(known, "band", EXACT_TOLERANCES), self.price)
+        known, criteria = self.known_multipliers(start.x), self.remaining_criteria()
+        first = self.objective(known, "band", EXACT_TOLERANCES)
+        objective = TimedBoundedAction(first, self.price, self.lengths)
         criteria = dataclasses.replace(criteria, decrease=LAST_DECREASE, plain=False)
-        x = TimedPath(start.x, problem.grid.duration)
+        x = TimedPath(start.x, self.lengths)
         found = minimize_bounded(objective, Start(x, start.z), criteria, self.report)
         self.iterations += len(found.steps)
         self.history += found.steps
@@ -87,18 +93,18 @@ class TimedSearch(BoundedSearch):
             self.near = last.near
         if found.why is not Reason.DIVERGED:
             self.multipliers = last.action.multipliers
-        self._stretch(found.x.duration)
+        self.back_to(found.x.lengths)
         self.last = self.problem, found.x.path
-        ended = self._at_its_duration(found, objective)
-        self.points = []  # these are of other durations
+        ended = self._at_its_lengths(found, objective)
+        self.points = []  # these are of other lengths
         stationary = ended.why is Reason.STATIONARY
         self.unmet = spurious_sentence(self.problem, ended.x) if stationary else ""
         if stationary and ended.saved:
-            self._add_points(ended, objective.at(found.x.duration))
+            self._add_points(ended, objective.at(found.x.lengths))
         return ended
 
     def solve_fixed(self, path: DiscretePath) -> Bounded:
-        """Solve for the problem's duration, well enough for a motion that is to be stretched."""
+        """Solve for the problem's lengths, well enough for a motion that is to be stretched."""
         known, rough = self.known_multipliers(path), self.remaining_criteria().rough()
         objective = self.objective(known, tolerances=ROUGH_TOLERANCES)
         ended = self.minimized(objective, Start(path), rough)
@@ -106,38 +112,39 @@ class TimedSearch(BoundedSearch):
             self.multipliers = objective.action.multipliers
         return ended
 
-    def back_to(self, problem: TrajectoryProblem) -> None:
-        """See BoundedSearch: to the duration of the problem."""
-        self._stretch(problem.grid.duration)
+    def back_to(self, lengths: Array) -> None:
+        """See BoundedSearch: the problem and its guess for these lengths."""
+        clock, before, now = self.price.clock, self.problem, self.lengths
+        if np.array_equal(lengths, now):
+            return
+        self.problem, self.lengths = before.lasting(clock, now, lengths), lengths
+        self.limits = self.problem.limits or self.limits
+        self.rows = self.rows.on(self.problem.grid)
+        self.near = self.near and self.near.on(self.problem, self.rows)
+        guess = stretched_path(self.guess, before.grid, clock, now, lengths)
+        self.guess = self.problem.moved(guess)
 
-    def _stretch(self, duration: float) -> None:
-        """Move the problem and its guess to another duration, in [s]."""
-        before = self.problem.grid.duration
-        if duration != before:
-            self.problem = self.problem.on(self.problem.grid.stretched(duration))
-            self.rows = self.rows.on(self.problem.grid)
-            self.near = self.near and self.near.on(self.problem, self.rows)
-            self.guess = self.problem.moved(stretched_path(self.guess, duration / before))
-
-    def _at_its_duration(
+    def _at_its_lengths(
         self, found: Ended[TimedPath, Barrier], objective: TimedBoundedAction
     ) -> Bounded:
-        """The end of a solve for the problem of its duration, whose points weigh more or less."""
-        T, barrier = found.x.duration, found.z
-        fraction, price = objective.fraction(T), self.price.weight * T
-        saved = [
-            (fraction * product, self.problem.moved(stretched_path(x.path, T / x.duration)))
-            for product, x in found.saved
-        ]
+        """The end of a solve for the problem of its lengths, whose points weigh more or less."""
+        lengths, barrier, clock = found.x.lengths, found.z, self.price.clock
+        fraction, at = objective.fraction(lengths), objective.at(lengths)
+        mean = float(fraction.mean()) if len(fraction) > 0 else 1.0
+        saved = list[tuple[float, DiscretePath]]()
+        for product, x in found.saved:
+            grid = objective.at(x.lengths).problem.grid
+            path = stretched_path(x.path, grid, clock, x.lengths, lengths)
+            saved.append((mean * product, self.problem.moved(path)))
         return Ended(
             found.x.path,
-            Outputs(found.outputs.value - price, found.outputs.y),
+            Outputs(found.outputs.value - self.price.of(lengths), found.outputs.y),
             dataclasses.replace(
                 barrier,
-                bounds=objective.at(T).bounds,
+                bounds=at.bounds,
                 zl=fraction * barrier.zl,
                 zu=fraction * barrier.zu,
-                mu=fraction * barrier.mu,
+                mu=mean * barrier.mu,
             ),
             found.why,
             found.steps,
@@ -146,7 +153,7 @@ class TimedSearch(BoundedSearch):
         )
 
     def negative_eigenvalues(self, ended: Bounded) -> int:
-        """n_neg of the condensed system, the duration among its unknowns."""
+        """n_neg of the condensed system, the lengths among its unknowns."""
         model = ended.model
         if ended.why is not Reason.STATIONARY or not isinstance(model, BorderedModel):
             return -1
@@ -191,10 +198,10 @@ def _searched(search: TimedSearch) -> Answer:
 
 
 def _at_the_points(search: TimedSearch) -> Bounded:
-    """A minimum with bounds at the points, near a motion of the guess's own duration if possible.
+    """A minimum with bounds at the points, near a motion of the guess's own lengths if possible.
 
-    A distant guess first becomes a motion of its duration, so that a motion of another shape is not
-    stretched or shrunk to a bound; a duration that is too short for one moves from the beginning.
+    A distant guess first becomes a motion of its lengths, so that a motion of another shape is not
+    stretched or shrunk to a bound; lengths that are too short for one move from the beginning.
     """
     path = search.guess
     if not search.start.near:

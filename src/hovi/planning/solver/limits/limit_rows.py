@@ -113,12 +113,13 @@ class LimitRows:
         return rows
 
     def stretched(self, grid: Grid) -> LimitRows:
-        """The same rows on the grid with all steps multiplied by a factor."""
+        """The same rows on the grid with other steps."""
         if grid is self.grid:
             return self
         rows = copy.copy(self)
         rows.grid = grid
-        powers = (grid.duration / self.grid.duration) ** -self.orders[:, None].astype(float)
+        ratios = (grid.steps / self.grid.steps)[self.intervals]
+        powers = (ratios ** -self.orders.astype(float))[:, None]
         rows.weights, rows.at_nodes, rows._nodal = rows._fraction_of_intervals(), None, None
         rows._regular, rows._beyond = self._regular * powers, self._beyond * powers
         return rows

@@ -94,6 +94,7 @@ class BoundedSearch:
     along, level: central path of a similar problem, if there is one on as many intervals, and the
         barrier parameter at which it is begun: see Start.
     locally_infeasible: see Answer.
+    lengths: of the free parts of the problem, in [s]; none where its times are given.
     """
 
     free_duration: ClassVar[bool] = False
@@ -108,6 +109,7 @@ class BoundedSearch:
     lazy: bool = False
     at_level: bool = False
     locally_infeasible: bool = False
+    lengths: Array = dataclasses.field(default_factory=lambda: np.zeros(0))
 
     def __post_init__(self) -> None:
         self.deadline = Deadline(self.criteria.time_limit)
@@ -232,8 +234,8 @@ class BoundedSearch:
         ]
         self.points = before + points
 
-    def back_to(self, problem: TrajectoryProblem) -> None:
-        """Continue from a motion of this problem: another one where the duration is free."""
+    def back_to(self, lengths: Array) -> None:
+        """Continue from a motion with these lengths of the free parts."""
 
     def remaining_criteria(self) -> Criteria:
         """The criteria with the remaining time as time limit."""

@@ -64,13 +64,13 @@ def tightened(search: BoundedSearch, ended: Bounded) -> tuple[Bounded, str, floa
             break
         on_grid += 1
         finer = halvings < MAX_HALVINGS
-        problem = search.problem
+        lengths = search.lengths
         coarse = excess > HALVING_EXCESS or (finer and on_grid > MAX_ROUNDS_PER_GRID)
         again = None if coarse else _solved_tighter(search, ended, sides)
         failed = again is None or not (_goes_on(search, again) or again.why in STOPPED)
         if failed and finer:
             halvings, on_grid = halvings + 1, 0
-            search.back_to(problem)
+            search.back_to(lengths)
             again, reason = _solved_on_halves(search, ended, sides)
         if again is None:
             break

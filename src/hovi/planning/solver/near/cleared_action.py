@@ -197,6 +197,13 @@ class ClearedAction(BoundedAction):
         other._limit_outputs = RecentPaths()
         return other
 
+    @property
+    def output_intervals(self) -> Index:
+        """See BoundedAction.output_intervals."""
+        first, limits = self._point_count, super().output_intervals
+        rows = np.append(limits[first:], self.near.intervals)
+        return np.append(limits[:first], rows[self.near.order] if self.near.size > 0 else rows)
+
     def _renumbered(
         self, order: Index, before: int, kept: Index, origin: Index, added: int
     ) -> Refinement:

@@ -1,0 +1,125 @@
+"""The best durations of segments, against sequences of given durations around them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize
+
+import hovi
+from hovi.effects import Armature, Gravity, Payload
+
+WEIGHT = 20.0
+FREE = 0.3, 6.0
+GRID = {"scheme": "galerkin-2", "intervals": 24, "self_collision": False, "processes": 1}
+Q = np.array([[-1.5, 0.0], [-0.8, 0.9], [0.2, 0.2], [0.6, -0.4]])
+ALL = {"free_velocity": ["shoulder", "elbow"]}
+TORQUES = {"base": "none", "v": 4.0, "tau": [8.0, 3.0]}
+Asked = list[dict[str, Any]]
+
+
+def arm() -> hovi.Scene:
+    robot = hovi.load_robot(hovi.example("two_link.urdf"))
+    return hovi.Scene(robot, [Gravity(9.8), Armature(0.05)])
+
+
+def stops(**velocity: Any) -> Asked:
+    """Three segments, with this at the two goals on the way."""
+    inner = [{"goal": hovi.State(q, **velocity), "duration": FREE} for q in Q[1:3]]
+    return [*inner, {"goal": hovi.State(Q[3]), "duration": FREE}]
+
+
+def changed(segments: Asked, **changes: Any) -> Asked:
+    """With another second segment."""
+    return [segments[0], segments[1] | changes, segments[2]]
+
+
+def aimed() -> Asked:
+    """The second goal is a position of the tip."""
+    robot = arm().robot
+    position = robot.frame_position(robot.tip_frame, Q[2])
+    return changed(stops(), goal=hovi.FrameGoal(robot.tip_frame, position=position, guess=Q[2]))
+
+
+KINDS: dict[str, tuple[Callable[[], Asked], dict[str, Any]]] = {
+    "stops": (stops, {}),
+    "passes": (lambda: stops(**ALL), {}),
+    "one given": (lambda: changed(stops(**ALL), duration=1.0), {}),
+    "carried": (lambda: changed(stops(**ALL), effects=[Payload(arm().robot.tip_frame, 0.5)]), {}),
+    "within limits": (lambda: stops(**ALL), {"limits": TORQUES}),
+    "limits of one": (lambda: changed(stops(**ALL), limits=TORQUES), {}),
+    "at a bound": (lambda: changed(stops(**ALL), duration=(2.5, 4.0)), {"limits": TORQUES}),
+    "a frame on the way": (aimed, {}),
+}
+
+
+def planned(segments: Asked, options: dict[str, Any], **more: Any) -> hovi.Solution:
+    given = GRID | {"limits": "none"} | options | more
+    return hovi.plan_sequence(arm(), hovi.State(Q[0]), segments, **given)
+
+
+def lasting(segments: Asked, durations: np.ndarray) -> Asked:
+    return [each | {"duration": float(T)} for each, T in zip(segments, durations, strict=True)]
+
+
+def durations_of(found: hovi.Solution) -> np.ndarray:
+    text = found.message.partition("The segments last ")[2].partition(" s.")[0]
+    return np.array([float(part) for part in text.replace("and", ",").split(",") if part.strip()])
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_no_other_durations_cost_less(kind: str) -> None:
+    asked, options = KINDS[kind]
+    segments = asked()
+    found = planned(segments, options, time_weight=WEIGHT)
+    assert found.success, found.message
+    T = durations_of(found)
+    bounds = [x if isinstance(x := each["duration"], tuple) else (x, x) for each in segments]
+    free = [i for i, (lower, upper) in enumerate(bounds) if lower < upper]
+
+    def total(scaled: np.ndarray) -> float:
+        changed = T.copy()
+        changed[free] = np.clip(T[free] * scaled, *np.array(bounds)[free].T)
+        again = planned(lasting(segments, changed), options, guess=found.trajectory)
+        assert again.success, again.message
+        return again.cost + WEIGHT * float(changed.sum())
+
+    simplex = np.vstack([np.ones(len(free)), 1.0 + 0.03 * np.eye(len(free))])
+    search = {"initial_simplex": simplex, "maxfev": 40, "xatol": 1e-4, "fatol": 1e-9}
+    best = minimize(total, np.ones(len(free)), method="Nelder-Mead", options=search)
+    limited = bool(options) or kind == "limits of one"
+    close = 1e-4 if limited else 1e-5  # other durations have other grids
+    assert total(np.ones(len(free))) == pytest.approx(found.cost, rel=close)
+    assert best.fun >= found.cost * (1.0 - close)
+    if not limited:
+        for i, number in enumerate(free):
+            step = 1e-3 * np.eye(len(free))[i]
+            slope = (total(1.0 + step) - total(1.0 - step)) / (2e-3 * T[number])
+            assert abs(slope) <= 1e-3 * WEIGHT
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_free_durations_take_few_steps(kind: str) -> None:
+    """At most four times those of the same sequence with given durations, their means."""
+    asked, options = KINDS[kind]
+    segments = asked()
+    found = planned(segments, options, time_weight=WEIGHT)
+    means = [np.sqrt(np.prod(x)) if isinstance(x := s["duration"], tuple) else x for s in segments]
+    given = planned(lasting(segments, np.array(means)), options)
+    assert found.success, found.message
+    assert given.success, given.message
+    assert found.nit <= 4 * given.nit
+
+
+def test_a_duration_at_its_bound_is_exactly_there() -> None:
+    asked, options = KINDS["at a bound"]
+    assert durations_of(planned(asked(), options, time_weight=WEIGHT))[1] == 2.5
+
+
+def test_a_stopped_search_keeps_the_best_motion() -> None:
+    found = planned(stops(**ALL), {"limits": TORQUES}, time_weight=WEIGHT, max_iterations=3)
+    assert not found.success
+    assert found.trajectory.duration > 0.9

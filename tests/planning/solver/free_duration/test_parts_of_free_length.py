@@ -1,0 +1,118 @@
+"""Lengths of parts as unknowns: derivatives are those of the action and of bounded outputs."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+import hovi
+from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
+from hovi.discrete.grid import Grid
+from hovi.optimize.quadratic_model import QuadraticModel
+from hovi.planning.problem.clock import Clock
+from hovi.planning.problem.limits import Limits, as_limits
+from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.problem.seams import Seam
+from hovi.planning.solver.bounded_action import BoundedAction
+from hovi.planning.solver.free_duration.timed_action import TimedAction
+from hovi.planning.solver.free_duration.timed_bounded_action import TimedBoundedAction
+from hovi.planning.solver.free_duration.timed_path import TimedPath, TimePrice
+from hovi.planning.solver.limits.limit_rows import LimitRows
+from hovi.schemes import galerkin
+from samples.asked_motions import two_link
+
+Array = npt.NDArray[np.float64]
+
+GRID = Grid(np.array([0.1, 0.2, 0.15, 0.12, 0.2, 0.1, 0.13, 0.2]), (galerkin(3),) * 8)
+T, FIRST, LAST = GRID.duration, GRID.t[2], GRID.t[5]
+CLOCKS = {
+    "whole": (Clock(), [T]),
+    "between seams": (Clock((FIRST, T - LAST)), [LAST - FIRST]),
+    "from the start": (Clock((0.0, T - FIRST)), [FIRST]),
+    "to the goal": (Clock((LAST, 0.0)), [T - LAST]),
+    "all segments": (Clock((0.0, 0.0, 0.0, 0.0)), [FIRST, LAST - FIRST, T - LAST]),
+    "first and last": (Clock((0.0, LAST - FIRST, 0.0)), [FIRST, T - LAST]),
+}
+AT_REST = hovi.State([0.3, 0.4]), hovi.State([1.0, -0.5])
+FREE = tuple(hovi.State(each.q, free_velocity=["shoulder", "elbow"]) for each in AT_REST)
+MOVING = tuple(hovi.State(each.q, v=[0.5, -0.2]) for each in AT_REST)
+
+
+def problem_of(goals: tuple[hovi.State, ...], limits: Limits | None = None) -> TrajectoryProblem:
+    scene = hovi.Scene(two_link(), [hovi.effects.Gravity()])
+    seams = tuple(Seam(t, goal) for t, goal in zip((FIRST, LAST), goals, strict=True))
+    ends = hovi.State([0.0, 0.0], v=[0.3, 0.2]), hovi.State([1.0, 0.4], v=[0.1, -0.4])
+    ld = DiscreteLagrangian(scene.effort_lagrangian(), GRID)
+    return TrajectoryProblem(ld, *ends, limits, seams)
+
+
+def price_of(clock: Clock, count: int) -> TimePrice:
+    return TimePrice(3.0, np.full(count, 0.01), np.full(count, 5.0), clock)
+
+
+def hessian_of(model: QuadraticModel) -> Array:
+    """The dense bordered Hessian."""
+    inner, border = model.inner, model.border
+    products = [
+        inner.scatter(np.einsum("kabij,kbj->kai", inner.intervals.hessian, inner.gather(unit)))
+        for unit in np.eye(len(inner.gradient))
+    ]
+    return np.block([[np.array(products), border.columns], [border.columns.T, border.corner]])
+
+
+@pytest.mark.parametrize("goals", [AT_REST, MOVING, FREE], ids=["rest", "moving", "free"])
+@pytest.mark.parametrize("name", CLOCKS)
+def test_the_model_has_the_derivatives_of_the_action(
+    name: str, goals: tuple[hovi.State, ...]
+) -> None:
+    """By differences along random steps from a random motion, of the value after the step."""
+    clock, first = CLOCKS[name]
+    rng, lengths = np.random.default_rng(3), np.array(first)
+    problem = problem_of(goals)
+    objective = TimedAction(problem, price_of(clock, len(lengths)), lengths)
+    x = TimedPath(problem.guess("cubic"), lengths)
+    model = objective.model(x, None, None)
+    x = objective.retract(x, 0.2 * rng.normal(size=len(model.gradient)), model)
+    model = objective.model(x, None, None)
+    hessian = hessian_of(model)
+
+    def value(step: Array) -> float:
+        return objective.value(objective.retract(x, step, model))
+
+    for alone in (False, True):
+        step = 1e-3 * rng.normal(size=len(model.gradient))
+        if alone:
+            step[: -len(lengths)] = 0.0
+        up, down, wide, low = (value(each * step) for each in (1.0, -1.0, 2.0, -2.0))
+        slope = (8.0 * (up - down) - (wide - low)) / 12.0
+        assert slope == pytest.approx(model.gradient @ step, rel=1e-7)
+        bend = (16.0 * (up + down) - (wide + low) - 30.0 * value(0.0 * step)) / 12.0
+        assert bend == pytest.approx(step @ hessian @ step, rel=1e-6)
+
+
+@pytest.mark.parametrize("goals", [AT_REST, FREE], ids=["rest", "free"])
+@pytest.mark.parametrize("name", CLOCKS)
+def test_bounded_outputs_change_as_predicted(name: str, goals: tuple[hovi.State, ...]) -> None:
+    """Torques at the points and rows of limits on q, v and a; and pull is the adjoint of push."""
+    clock, first = CLOCKS[name]
+    rng, lengths = np.random.default_rng(4), np.array(first)
+    limits = as_limits(two_link(), {"base": "none", "q": 9, "v": 20, "a": 400, "tau": 50})
+    problem = problem_of(goals, limits)
+    rows = LimitRows(GRID, limits, None, problem.free_ends, (0, 1))
+    bounded = BoundedAction(problem, limits, rows=rows)
+    objective = TimedBoundedAction(bounded, price_of(clock, len(lengths)), lengths)
+    zero = np.zeros(len(objective.bounds.lower))
+    x = TimedPath(problem.guess("cubic"), lengths)
+    model = objective.model(x, zero, zero, zero)
+    x = objective.retract(x, 0.2 * rng.normal(size=len(model.gradient)), model)
+    model = objective.model(x, zero, zero, zero)
+    step = 1e-4 * rng.normal(size=len(model.gradient))
+    moved = [objective.outputs(objective.retract(x, e * step, model)).y for e in (1.0, -1.0)]
+    predicted = objective.push(step, model)
+    assert np.abs(predicted).max() > 1e-5
+    np.testing.assert_allclose((moved[0] - moved[1]) / 2.0, predicted, rtol=0, atol=1e-9)
+    forces = rng.normal(size=len(zero))
+    work = np.vdot(objective.bounds.weights * forces, predicted)
+    whole = objective.pull(forces, model) @ step
+    assert whole == pytest.approx(work, rel=1e-9)
