@@ -99,6 +99,21 @@ def test_the_best_duration_is_that_of_a_scalar_search_around_solves(kind: str) -
         assert abs(slope) <= 1e-7 * WEIGHT
 
 
+def test_further_starts_begin_at_other_durations() -> None:
+    """Between a fast motion and a slow one, the cost of this reach has a hump at half a second."""
+    scene = hovi.Scene(hovi.load_robot("ur5"), [Gravity()])
+    start = hovi.State([0.0, -1.4, 1.6, -0.2, 0.5, 0.0])
+    aim = hovi.FrameGoal("tool0", position=[0.45, 0.25, 0.25])
+    one, three = (
+        hovi.plan(scene, start, aim, (0.2, 4.0), time_weight=100.0, starts=starts, processes=1)
+        for starts in (1, 3)
+    )
+    assert one.success, one.message
+    assert three.success, three.message
+    assert three.cost < 0.6 * one.cost
+    assert abs(three.duration_derivative + 100.0) <= 1e-4
+
+
 @pytest.mark.parametrize("to", ["a configuration", "a frame"])
 @pytest.mark.parametrize("weight", [1e3, 1e6])
 def test_a_large_price_of_time_makes_motions_no_less_accurate(to: str, weight: float) -> None:

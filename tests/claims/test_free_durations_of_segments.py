@@ -119,6 +119,18 @@ def test_a_duration_at_its_bound_is_exactly_there() -> None:
     assert durations_of(planned(asked(), options, time_weight=WEIGHT))[1] == 2.5
 
 
+def test_two_starts_are_no_dearer_than_either() -> None:
+    """They begin at the geometric means of the bounds, and at the longest durations."""
+    options = {"limits": TORQUES, "time_weight": 2.0}
+    both = planned(stops(), options, starts=2)
+    means = planned(stops(), options)
+    long = [{"duration": (0.9 * 6.0, 6.0)}] * 3
+    slow = planned([each | own for each, own in zip(stops(), long, strict=True)], options)
+    assert both.success, both.message
+    assert both.cost <= means.cost * (1 + 1e-9)
+    assert both.cost <= slow.cost * (1 + 1e-9)
+
+
 def test_a_stopped_search_keeps_the_best_motion() -> None:
     found = planned(stops(**ALL), {"limits": TORQUES}, time_weight=WEIGHT, max_iterations=3)
     assert not found.success

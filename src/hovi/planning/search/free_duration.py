@@ -35,6 +35,9 @@ SolveFor = Callable[[float, Trajectory], Solution]
 
 PROBES = 4, 2
 """Numbers of other first durations, on the more and on the less promising side."""
+OTHERS = 0.25, 0.75, 0.0, 1.0
+"""Where further starts begin between the logarithms of the bounds; the first one is in the middle.
+"""
 MAX_STRIDE = 1.3
 """Maximum ratio of successive durations while a bracket is searched for."""
 DURATION_PRECISION = 1e-12
@@ -93,6 +96,12 @@ class FreeDuration:
     def slope(self, solution: Solution) -> float:
         """J' + w of a minimum, in cost per [s]."""
         return solution.derivative_in_time(self.clock.rates) + self.weight
+
+    @property
+    def others(self) -> list[float]:
+        """First lengths of further starts, in [s]."""
+        ratio = self.upper / self.lower
+        return [self.lower * ratio**fraction for fraction in OTHERS]
 
     def probes(self, limited: bool) -> list[float]:
         """Other first durations, in [s], from the geometric mean to each bound.

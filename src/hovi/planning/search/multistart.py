@@ -26,6 +26,7 @@ from hovi.planning.problem.notation.goal_turns import says_turns
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.search.free_duration import FreeDuration
 from hovi.planning.search.job import Job
+from hovi.planning.solver.free_duration.timed_path import stretched_path
 from hovi.planning.solver.solver import Solution, solve_on_grid
 from hovi.planning.solver.status import Status
 from hovi.robot.robot import Robot
@@ -45,6 +46,10 @@ COMPARED_TIMES = 17
 """Number of times at which motions are compared."""
 SAME_COST = 1e-6
 """Relative difference in cost up to which two minima count as the same."""
+
+
+_Begun = tuple[DiscretePath, float | None]
+"""A guess, and the length of a free part with which it begins: see Pool.solve_all."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,17 +79,22 @@ class Pool:
     deadline: Deadline = field(default_factory=Deadline)
     free: FreeDuration | None = None
 
-    def solve_all(self, guesses: Sequence[DiscretePath]) -> Solved:
+    def solve_all(
+        self, guesses: Sequence[DiscretePath], lengths: Sequence[float | None] | None = None
+    ) -> Solved:
         """The solutions from the guesses, without those whose process died.
 
+        lengths: of a free part with which each begins, in [s]; that of the job for None.
         If worker processes cannot be started, the guesses are solved in this one. Raises
         KeyboardInterrupt after an interrupt if there is no solution yet.
         """
         results: dict[int, Solution | Lost] = {}
+        begun = [None] * len(guesses) if lengths is None else lengths
+        starts: list[_Begun] = list(zip(guesses, begun, strict=True))
         try:
-            if min(self.processes, len(guesses)) > 1:
-                self._in_workers(guesses, results)
-            self._here(guesses, results)
+            if min(self.processes, len(starts)) > 1:
+                self._in_workers(starts, results)
+            self._here(starts, results)
         except KeyboardInterrupt:
             record_interrupt()
             if not results:
@@ -92,30 +102,24 @@ class Pool:
             return _solved(results, interrupted=True)
         return _solved(results)
 
-    def _in_workers(
-        self, guesses: Sequence[DiscretePath], results: dict[int, Solution | Lost]
-    ) -> None:
+    def _in_workers(self, starts: Sequence[_Begun], results: dict[int, Solution | Lost]) -> None:
         """Add the results of worker processes."""
         from hovi.workers.pool import results_in_workers  # not needed for one process
 
         work = partial(_solve, self.job, self.free)
-        found = results_in_workers(work, guesses, self.processes, self.deadline)
+        found = results_in_workers(work, starts, self.processes, self.deadline)
         with closing(found):
             results.update(found)
 
-    def _here(
-        self,
-        guesses: Sequence[DiscretePath],
-        results: dict[int, Solution | Lost],
-    ) -> None:
+    def _here(self, starts: Sequence[_Begun], results: dict[int, Solution | Lost]) -> None:
         """Add the results that are missing; none of them if the time limit is why."""
-        for i, guess in enumerate(guesses):
+        for i, start in enumerate(starts):
             if i in results:
                 continue
             if results and self.deadline.passed:
                 return
             left = self.deadline.seconds_left
-            results[i] = solution = _solve(self.job, self.free, guess, left)
+            results[i] = solution = _solve(self.job, self.free, start, left)
             if solution.status is Status.INTERRUPTED:
                 return
 
@@ -132,16 +136,21 @@ def _solved(results: dict[int, Solution | Lost], interrupted: bool = False) -> S
 def _solve(
     job: Job,
     free: FreeDuration | None,
-    guess: DiscretePath,
+    start: _Begun,
     time_limit: float | None,
 ) -> Solution:
     """The solution from one guess, without the problem, which is not sent."""
+    guess, length = start
     problem, most = job.problem(), job.options.max_iterations
     solution = None
     if free is not None:
         from hovi.planning.search.joint_duration import joint_minimum  # rarely needed
 
         now = np.array([free.clock.length(problem.grid)])
+        if length is not None:
+            guess = stretched_path(guess, problem.grid, free.clock, now, np.array([length]))
+            problem, now = job.lasting(free.clock, length).problem(), np.array([length])
+            guess = problem.moved(guess)
         known = free.price, now, problem, guess, most, time_limit
         solution = joint_minimum(*known, barrier=job.barrier)
     if solution is None:
@@ -200,7 +209,8 @@ def explore(
     """
     if starts == 1 and (first.paths or first.branches):
         return _from_path_or_direct(pool, first, progress)
-    one = pool.solve_all(first.all[:starts])
+    guesses, lengths = _first_starts(first, pool.free)
+    one = pool.solve_all(guesses[:starts], lengths[:starts])
     solutions, lost = one.solutions, one.lost
     ended = stopped = one.interrupted
     numbered = zip(one.numbers, one.solutions, strict=True)
@@ -223,6 +233,20 @@ def explore(
         stopped = True
     minima = distinct(solutions)
     return Exploration(minima, len(solutions), stopped, tuple(lost), first, by_path)
+
+
+def _first_starts(
+    first: FirstGuesses, free: FreeDuration | None
+) -> tuple[list[DiscretePath], list[float | None]]:
+    """The first guesses, and the length of a free part with which each begins, None for the job's.
+
+    With a free length the best guess begins with others, too: each leads downhill to a minimum of
+    its own. Guesses to other branches come after these.
+    """
+    many = len(first.all) - len(first.branches)
+    others = [] if free is None else free.others
+    guesses = [*first.all[:many], *[first.all[0]] * len(others), *first.branches]
+    return guesses, [*[None] * many, *others, *[None] * len(first.branches)]
 
 
 def _from_path_or_direct(pool: Pool, first: FirstGuesses, progress: Progress) -> Exploration:

@@ -138,10 +138,13 @@ def plan_sequence(
     chosen, apart = kept_apart(chosen.on(scene), scene.robot, stops)
     free = FreeSegments.of(durations_of(checked), chosen.time_weight)
     planned = partial(_planned, scene, begin, goals, checked, chosen, deadline, progress or silent)
-    for durations in free.first:
-        found, job = planned(free, durations, began)
-        if found.success or found.status in STOPPED:
+    found, job = planned(free, free.first[0], began)
+    for durations in free.first[1:]:
+        if found.status in STOPPED or (found.success and chosen.starts == 1):
             break
+        other, its_job = planned(free, durations, began)
+        if not found.success or (other.success and other.cost < found.cost):
+            found, job = other, its_job
     scenes = [each.acting.on(job.scene) for each in job.segments]
     return _named(with_notes(found, scenes, job.options, apart), checked)
 
