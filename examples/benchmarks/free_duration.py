@@ -35,7 +35,7 @@ KINDS = (
 )
 BALL, POWER = 0.05, 100.0
 """Radius of the ball in the middle of the path straight in q, in [m], and the power, in [W]."""
-REACHES = 6
+REACHES, MOVES = 6, 3
 RUNS = 3
 
 Row = list[float]
@@ -109,6 +109,52 @@ def random_rows(name: str, kind: str) -> list[Row]:
     return rows
 
 
+def sequence_rows(name: str, passing: bool) -> list[Row]:
+    """Sequences of random moves within the limits of the URDF, as `compare` without slopes.
+
+    passing: whether the robot moves through the goals on the way; it stops there otherwise.
+    """
+    robot = hovi.load_robot(name)
+    scene = hovi.Scene(robot, [Gravity()])
+    lower = np.maximum(robot.model.lowerPositionLimit, -np.pi)
+    upper = np.minimum(robot.model.upperPositionLimit, np.pi)
+    middle, half = 0.5 * (lower + upper), 0.5 * (upper - lower)
+    free = {"free_velocity": list(robot.joint_names)} if passing else {}
+    options = {"limits": "urdf", "intervals": 36, "self_collision": False, "processes": 1}
+    random = np.random.default_rng(5)
+
+    def planned(start: np.ndarray, goals: list[hovi.State], durations: Any, **more: Any) -> Any:
+        moves = [hovi.Segment(goal, T) for goal, T in zip(goals, durations, strict=True)]
+        began = time.process_time()
+        found = hovi.plan_sequence(scene, start, moves, **options, **more)
+        return found, time.process_time() - began
+
+    rows = []
+    for _ in range(REACHES):
+        q = [middle + 0.6 * half * random.uniform(-1.0, 1.0, robot.nv)]
+        for _ in range(MOVES):
+            moved = q[-1] + 0.3 * half * random.uniform(-1.0, 1.0, robot.nv)
+            q.append(np.clip(moved, middle - 0.9 * half, middle + 0.9 * half))
+        goals = [*(hovi.State(each, **free) for each in q[1:-1]), hovi.State(q[-1])]
+        found, seconds = planned(q[0], goals, [BOUNDS] * MOVES, time_weight=ROBOTS[name])
+        motion = found.trajectory
+        last = np.cumsum(motion.segments.intervals)
+        durations = np.diff(motion.grid.t[[0, *last]]).tolist()
+        fixed, given = planned(q[0], goals, durations)
+        T, success = motion.duration, found.success and fixed.success
+        rows.append([T, found.nit, fixed.nit, seconds, given, 0.0, success])
+    return rows
+
+
+def ratios_of(rows: list[Row]) -> list[str]:
+    """The successes, and medians and largest ratios of steps and times, as text."""
+    found = np.array(rows, dtype=float)
+    done = found[found[:, 6] == 1.0]
+    steps, times = done[:, 1] / done[:, 2], done[:, 3] / done[:, 4]
+    ratios = [f"{f(x):.1f}" for x in (steps, times) for f in (np.median, np.max)]
+    return [f"{len(done)} of {REACHES}", *ratios]
+
+
 def cells(row: Row) -> list[str]:
     """The numbers of a row as text, ratios included."""
     T, steps, given_steps, seconds, given, slope, success = row
@@ -134,14 +180,18 @@ def main() -> None:
     print(f"{REACHES} random reaches within the limits of the URDF, 24 intervals.\n")
     rows = []
     for name, kind in itertools.product(ROBOTS, KINDS):
-        found = np.array(alone(random_rows, name, kind), dtype=float)
-        done = found[found[:, 6] == 1.0]
-        steps, times = done[:, 1] / done[:, 2], done[:, 3] / done[:, 4]
-        good = f"{int(found[:, 6].sum())} of {REACHES}"
-        ratios = [f"{f(x):.1f}" for x in (steps, times) for f in (np.median, np.max)]
-        rows.append([f"`{name}`, {kind}", good, *ratios, f"{done[:, 5].max():.0e}"])
+        found = alone(random_rows, name, kind)
+        slope = max(row[5] for row in found if row[6])
+        rows.append([f"`{name}`, {kind}", *ratios_of(found), f"{slope:.0e}"])
     names = ["successes", "steps, median", "largest", "time, median", "largest"]
     print_table(["robot and task", *names, "largest abs(dS/dT + w) / w"], rows)
+    print(f"{REACHES} random sequences of {MOVES} moves, each of a free duration, 36 intervals.\n")
+    rows = [
+        [f"`{name}`, {'passing' if passing else 'stopping at'} goals on the way", *ratios_of(found)]
+        for name, passing in itertools.product(ROBOTS, (False, True))
+        if (found := alone(sequence_rows, name, passing))
+    ]
+    print_table(["robot and task", *names], rows)
     print_machine()
 
 

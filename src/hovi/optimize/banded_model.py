@@ -225,7 +225,8 @@ class BandModel(QuadraticModel):
     def negative_eigenvalues(self, border: tuple[Array, Array] | None = None) -> int:
         """Number of negative eigenvalues of H, by elimination of blocks as wide as the band.
 
-        The counts of the pivot blocks add up: Haynsworth's inertia additivity.
+        The counts of the pivot blocks add up: Haynsworth's inertia additivity. -1 where one of them
+        is singular.
         border: further columns B, (size, p), and their corner C; the count is that of
             [H B; B^T C].
         """
@@ -237,18 +238,22 @@ class BandModel(QuadraticModel):
         columns, corner = np.zeros((size, 0)), np.zeros((0, 0))
         if border is not None:
             columns, corner = border[0].copy(), border[1].copy()
-        solved = columns[:0]
+        solved = np.zeros((block, columns.shape[1]))
         for first in range(0, size, block):
             last = min(first + block, size)
             pivot = _dense(bands, range(first, last), range(first, last))
             pivot += np.tril(pivot, -1).T
             if first:
                 coupling = _dense(bands, range(first, last), range(first - block, first))
-                pivot -= coupling @ np.linalg.solve(schur, coupling.T)
+                try:
+                    pivot -= coupling @ np.linalg.solve(schur, coupling.T)
+                except np.linalg.LinAlgError:
+                    return -1
                 columns[first:last] -= coupling @ solved
             schur = (pivot + pivot.T) / 2
-            solved = np.asarray(np.linalg.solve(schur, columns[first:last]), dtype=np.float64)
-            corner -= columns[first:last].T @ solved
+            if border is not None:
+                solved = np.asarray(np.linalg.solve(schur, columns[first:last]), dtype=np.float64)
+                corner -= columns[first:last].T @ solved
             count += int(np.sum(np.linalg.eigvalsh(schur) < 0))
         return count + int(np.sum(np.linalg.eigvalsh(corner) < 0))
 

@@ -41,8 +41,9 @@ class Border:
 class BorderedFactor:
     """A factorisation of the bordered H + shift D.
 
-    inner: of H + shift D. columns: B. solved: Z = (H + shift D)^-1 B. pivot: P. free: which of t
-    are not kept at their bounds, (p,): where the cost falls beyond them and P is not positive.
+    inner: of H + shift D. columns: B. solved: Z = (H + shift D)^-1 B, (size, p). pivot: P, (p, p).
+    free: which t are unknowns, (p,). The others stay at bounds beyond which the cost falls where
+    t = 0, which is looked at where P is not positive definite.
     """
 
     inner: Factor
@@ -97,8 +98,7 @@ class BorderedModel(QuadraticModel):
         pivot = pivot - border.columns.T @ solved
         free = np.ones(count, dtype=bool)
         if not _positive(pivot):
-            slope, (low, high) = self._slope_at(self.inner.descend(inner)[0]), border.room
-            free = ~(((low == 0) & (slope > 0)) | ((high == 0) & (slope < 0)))
+            free = self._inside(self._slope_at(self.inner.descend(inner)[0]))
             if free.all() or not _positive(pivot[np.ix_(free, free)]):
                 return None
         return BorderedFactor(inner, border.columns, solved, pivot, free)
@@ -123,6 +123,11 @@ class BorderedModel(QuadraticModel):
         """The slopes in t where all else is at its minimum x for t = 0: g_t + B^T x."""
         return np.asarray(self.border.slope + self.border.columns.T @ x)
 
+    def _inside(self, slope: Array) -> Mask:
+        """Which t are not at a bound beyond which the cost falls by these slopes, (p,)."""
+        low, high = self.border.room
+        return np.asarray(~(((low == 0) & (slope > 0)) | ((high == 0) & (slope < 0))))
+
     def reaction(
         self, gradient: Array, s: Array, factor: Factor | None
     ) -> tuple[Array, float] | None:
@@ -137,12 +142,18 @@ class BorderedModel(QuadraticModel):
         return self.inner.curvature_scale()
 
     def negative_eigenvalues(self) -> int:
-        """Number of negative eigenvalues of the bordered Hessian."""
-        return self.inner.negative_eigenvalues((self.border.columns, self.border.corner))
+        """Number of negative eigenvalues of the bordered Hessian, of t that bounds do not hold."""
+        border, free = self.border, self._inside(self.border.slope)
+        return self.inner.negative_eigenvalues(
+            (border.columns[:, free], border.corner[np.ix_(free, free)])
+        )
 
 
 def least_within(pivot: Array, slope: Array, low: Array, high: Array) -> Array:
-    """t of the least slope.t + 1/2 t.pivot t between bounds; the pivot is positive definite."""
+    """t of the least slope.t + 1/2 t.pivot t, low <= t <= high, shape (p,) each; low < high.
+
+    pivot: positive definite, (p, p).
+    """
     t = np.asarray(np.linalg.solve(pivot, -slope), dtype=np.float64)
     if len(t) == 1:
         return np.clip(t, low, high)
@@ -152,8 +163,7 @@ def least_within(pivot: Array, slope: Array, low: Array, high: Array) -> Array:
 
     upper = np.linalg.cholesky(pivot).T
     target = np.linalg.solve(upper.T, -slope)
-    wide = np.maximum(high, low + np.finfo(float).tiny)  # equal bounds are none to it
-    found = lsq_linear(upper, target, (low, wide), method="bvls", tol=1e-14)
+    found = lsq_linear(upper, target, (low, high), method="bvls", tol=1e-14, max_iter=100)
     return np.asarray(np.clip(found.x, low, high))
 
 

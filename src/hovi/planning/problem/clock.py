@@ -25,14 +25,19 @@ Lengths = Array | float
 
 @dataclass(frozen=True)
 class Clock:
-    """Times of a motion with p parts of free lengths, between which it lasts as long as given.
+    """Times of a motion of which p parts have free lengths; the times between them are given.
 
-    The intervals of a part keep their proportions.
+    Times are linear in a part, whose intervals keep their proportions.
     given: how long the motion lasts before the first part, between any two, and after the last, in
         [s]; p + 1 numbers. The single part of the default is the whole motion.
     """
 
     given: tuple[float, ...] = (0.0, 0.0)
+
+    @classmethod
+    def of_parts(cls, count: int) -> Clock:
+        """That of a motion in so many parts, with nothing between them."""
+        return cls((0.0,) * (count + 1))
 
     @property
     def whole(self) -> bool:
@@ -91,8 +96,8 @@ class Clock:
         return parts
 
     def ratios(self, grid: Grid, now: Lengths, lengths: Lengths) -> Array:
-        """By which the steps of a grid grow with other lengths, shape (N,)."""
-        grown = np.append(np.atleast_1d(lengths) / np.atleast_1d(now), 1.0)
+        """The steps of the grid for other lengths, relative to those of a grid, shape (N,)."""
+        grown = np.append(np.atleast_1d(lengths) / np.atleast_1d(now), 1.0)  # 1 for part -1
         return grown[self.parts(grid, now)]
 
     def grid(self, grid: Grid, now: Lengths, lengths: Lengths) -> Grid:
@@ -107,21 +112,21 @@ class Clock:
         return np.asarray(np.append(0.0, np.cumsum(steps)) / steps.sum())
 
     def lagrangian(self, of: Lagrangian, now: Lengths, lengths: Lengths) -> Lagrangian:
-        """L of a motion with other lengths: segments end at other times."""
+        """The Lagrangian of a motion with other lengths: segments end at other times."""
         if not isinstance(of, SegmentedLagrangian):
             return of
         ends = self.times(np.array(of.ends), now, lengths)
-        return SegmentedLagrangian(of.lagrangians, tuple(ends.tolist()))
+        return dataclasses.replace(of, ends=tuple(ends.tolist()))
 
     def limits(self, limits: Limits, now: Lengths, lengths: Lengths) -> Limits:
-        """The same of limits."""
+        """Limits of a motion with other lengths: those of segments end at other times."""
         if not limits.parts:
             return limits
         ends = self.times(np.array(limits.ends), now, lengths)
-        return Limits.of_segments(limits.parts, ends.tolist())
+        return dataclasses.replace(limits, ends=tuple(ends.tolist()))
 
     def via(self, via: Sequence[Via], now: Lengths, lengths: Lengths) -> tuple[Via, ...]:
-        """Via points at the times at which they are then."""
+        """Via points moved along with the parts."""
         times = self.times(np.array([each.time for each in via]), now, lengths).tolist()
         moved = zip(via, times, strict=True)
         return tuple(dataclasses.replace(each, time=t) for each, t in moved)

@@ -15,6 +15,7 @@ from hovi.discrete.trajectory import Trajectory
 from hovi.optimize.start import Start
 from hovi.planning.problem.clock import Clock
 from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.problem.time_price import TimePrice
 from hovi.planning.problem.tolerance import Round, Tolerance
 from hovi.planning.refinement.adaptive import first_grid, refine_to_tolerance
 from hovi.planning.refinement.faults.narrow_features import features_of
@@ -26,7 +27,6 @@ from hovi.planning.refinement.inactive_limits import (
 from hovi.planning.search.free_duration import FreeDuration, SolveFor
 from hovi.planning.search.job import Job, split_for_charts
 from hovi.planning.search.multistart import Pool, default_processes, distinct
-from hovi.planning.solver.free_duration.timed_path import TimePrice
 from hovi.planning.solver.initial_path import guess_path
 from hovi.planning.solver.solver import Solution, solve_on_grid
 from hovi.planning.solver.status import Status
@@ -136,7 +136,7 @@ class FinalStages:
         best = found
         for _ in range(MAX_GRIDS):
             best = dataclasses.replace(best, problem=on_grid_of(job.problem(), best))
-            job, best = best_segments(free, job, best, self._solver_of, self._solve_jointly)
+            job, best, edges = best_segments(free, job, best, self._solver_of, self._solve_jointly)
             steps += best.nit
             if tolerance is None or not best.success:
                 break
@@ -148,7 +148,9 @@ class FinalStages:
         said = best.message
         if best.success and tolerance is None:
             said = f"a minimum of cost {best.cost:.10g} after {steps} steps."
-        return dataclasses.replace(best, nit=steps, message=f"{said} {lengths_in_words(job)}")
+        return dataclasses.replace(
+            best, nit=steps, message=f"{said} {lengths_in_words(job)}{edges}"
+        )
 
     def _solver_of(self, job: Job, clock: Clock) -> OnGrid:
         return partial(dataclasses.replace(self, fine=job)._lasting, clock)
@@ -255,12 +257,18 @@ class FinalStages:
         """A minimum in the motion and lengths of parts from a motion; None where not supported."""
         from hovi.planning.search.joint_duration import joint_minimum
 
-        left, most = self.deadline.seconds_left, self.fine.options.max_iterations
-        problem, path = first.problem, first.trajectory.path
-        if problem is None:
+        if first.problem is None:
             return None
-        barrier = self.fine.barrier
-        return joint_minimum(price, now, problem, path, most, left, True, barrier)
+        return joint_minimum(
+            first.problem,
+            first.trajectory.path,
+            price,
+            now,
+            max_iterations=self.fine.options.max_iterations,
+            time_limit=self.deadline.seconds_left,
+            near=True,
+            barrier=self.fine.barrier,
+        )
 
     def _lasting(self, clock: Clock, grid: Grid) -> SolveFor:
         """A solver on a grid whose free part is stretched to each length."""

@@ -21,8 +21,8 @@ import numpy as np
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError
 from hovi.planning.problem.clock import Clock
+from hovi.planning.problem.time_price import TimePrice
 from hovi.planning.search.continuation import STOPPED, how_ended
-from hovi.planning.solver.free_duration.timed_path import TimePrice
 from hovi.planning.solver.outcome.cost_with_time import price_of_time
 from hovi.planning.solver.solver import Solution
 from hovi.planning.solver.status import Status
@@ -35,9 +35,9 @@ SolveFor = Callable[[float, Trajectory], Solution]
 
 PROBES = 4, 2
 """Numbers of other first durations, on the more and on the less promising side."""
-OTHERS = 0.25, 0.75, 0.0, 1.0
-"""Where further starts begin between the logarithms of the bounds; the first one is in the middle.
-"""
+OTHER_FRACTIONS = 0.25, 0.75, 0.0, 1.0
+"""Fractions of the way from log lower to log upper at which further starts begin; the first one
+begins in the middle."""
 MAX_STRIDE = 1.3
 """Maximum ratio of successive durations while a bracket is searched for."""
 DURATION_PRECISION = 1e-12
@@ -101,7 +101,7 @@ class FreeDuration:
     def others(self) -> list[float]:
         """First lengths of further starts, in [s]."""
         ratio = self.upper / self.lower
-        return [self.lower * ratio**fraction for fraction in OTHERS]
+        return [self.lower * ratio**fraction for fraction in OTHER_FRACTIONS]
 
     def probes(self, limited: bool) -> list[float]:
         """Other first durations, in [s], from the geometric mean to each bound.

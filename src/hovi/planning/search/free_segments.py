@@ -16,7 +16,15 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.planning.problem.clock import Clock
-from hovi.planning.search.free_duration import MAX_STRIDE, BestDuration, FreeDuration
+from hovi.planning.problem.time_price import TimePrice
+from hovi.planning.search.free_duration import (
+    EDGE_PRECISION,
+    MAX_STRIDE,
+    BestDuration,
+    FreeDuration,
+    action_of,
+    ended_search,
+)
 from hovi.planning.search.job import Job
 from hovi.planning.search.joint_duration import (
     NEXT_STRIDE,
@@ -25,7 +33,6 @@ from hovi.planning.search.joint_duration import (
     is_best,
     unless_best,
 )
-from hovi.planning.solver.free_duration.timed_path import TimePrice
 from hovi.planning.solver.solver import Solution
 from hovi.scene.segmented_lagrangian import SegmentedLagrangian
 from hovi.system.dataclass import dataclass
@@ -81,26 +88,26 @@ class FreeSegments:
     def all_parts(self, lengths: Array) -> TimePrice:
         """The price of time of all free segments. lengths: of all segments, in [s]."""
         lower, upper = np.array(self.bounds).T
-        clock = Clock((0.0,) * (len(lower) + 1))
+        clock = Clock.of_parts(len(lower))
         return TimePrice(self.weight, lower, upper, clock).with_given(lengths, lower == upper)
 
 
 def best_segments(
     free: FreeSegments, job: Job, first: Solution, solver_of: SolverOf, jointly: JointSolveOf
-) -> tuple[Job, Solution]:
-    """The job with the best durations of its segments, and its motion.
+) -> tuple[Job, Solution, str]:
+    """The job with the best durations of its segments, its motion, and what else to say of these.
 
     first: the motion of the job, with its problem. The motion is no success unless the duration of
     every segment is the best one, with those of the others as they are.
     """
     if _all_are_best(free, job, first):
-        return job, first
+        return job, first, ""
     together = _all_at_once(free, job, first, jointly)
     if together is None:
         return _one_by_one(free, job, first, solver_of)
     job, best = together
     if not best.success or _all_are_best(free, job, best):
-        return job, best
+        return job, best, ""
     return _one_by_one(free, job, best, solver_of)
 
 
@@ -122,16 +129,27 @@ def _all_at_once(
     if found is None or problem is None:
         return None
     found = dataclasses.replace(found, nit=first.nit + found.nit)
+    if not found.success:
+        found = _stopped(found, price.weight)
     grid, lagrangian = found.trajectory.grid, problem.ld.lagrangian
     assert isinstance(lagrangian, SegmentedLagrangian)
     lengths = np.diff([0.0, *lagrangian.ends, grid.duration])
-    whole = Clock((0.0,) * (len(now) + 1))
-    return job.lasting(whole, lengths, now, grid), found
+    return job.lasting(Clock.of_parts(len(now)), lengths, now=now, grid=grid), found
+
+
+def _stopped(found: Solution, weight: float) -> Solution:
+    """The best motion of a solve that was stopped, whose message counts all steps and the time."""
+    T, cost = found.trajectory.duration, action_of(found)
+    message = (
+        f"{ended_search(found.status)}; the motion is the best so far, of cost "
+        f"{cost + weight * T:.10g}, {weight * T:.6g} of it for time, after {found.nit} steps."
+    )
+    return dataclasses.replace(found, cost=cost + weight * T, message=message)
 
 
 def _one_by_one(
     free: FreeSegments, job: Job, first: Solution, solver_of: SolverOf
-) -> tuple[Job, Solution]:
+) -> tuple[Job, Solution, str]:
     """As `best_segments`, with a search for one duration after the other."""
     best, steps, found = first, first.nit, dict[int, BestDuration]()
     for _ in range(MAX_SWEEPS):
@@ -146,15 +164,23 @@ def _one_by_one(
             steps, best = steps + reached.steps - best.nit, reached.solution
             job = job.lasting(part.clock, part.length(best), grid=best.trajectory.grid)
             if not best.success:
-                return job, dataclasses.replace(reached.with_time(), nit=steps)
+                reached = dataclasses.replace(reached, steps=steps)
+                return job, reached.with_time(), ""
         if not changed:
             break
     for number, known in found.items():
         part = free.part(number, job)
         assert part is not None
-        if not is_best(again := _again(known, part, best)):
+        again = dataclasses.replace(_again(known, part, best), steps=steps)
+        if not is_best(again):
             best = unless_best(again).with_time()
-    return job, dataclasses.replace(best, nit=steps)
+    edges = [number for number, known in found.items() if known.at_edge]
+    said = "".join(
+        f" That of segment {number + 1} is, to {100 * EDGE_PRECISION:g} %, the last one for which "
+        "a motion was found, with less cost expected beyond."
+        for number in edges
+    )
+    return job, dataclasses.replace(best, nit=steps), said
 
 
 def _again(found: BestDuration, part: FreeDuration, motion: Solution) -> BestDuration:

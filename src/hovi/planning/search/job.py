@@ -164,7 +164,12 @@ class Job:
         return dataclasses.replace(self, grid=grid)
 
     def lasting(
-        self, clock: Clock, lengths: Lengths, now: Lengths | None = None, grid: Grid | None = None
+        self,
+        clock: Clock,
+        lengths: Lengths,
+        *,
+        now: Lengths | None = None,
+        grid: Grid | None = None,
     ) -> Self:
         """The job with other lengths of its free parts, in [s], on a grid for them.
 

@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from hovi.discrete.grid import DiscretePath, Grid
 from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.problem.time_price import TimePrice
 from hovi.planning.problem.tolerance import LAST_BARRIER
 from hovi.planning.search.continuation import STOPPED
 from hovi.planning.search.free_duration import (
@@ -26,7 +27,6 @@ from hovi.planning.search.free_duration import (
     ended_search,
 )
 from hovi.planning.solver.free_duration.joint_solve import solve_jointly, solves_jointly
-from hovi.planning.solver.free_duration.timed_path import TimePrice
 from hovi.planning.solver.solver import Solution
 from hovi.planning.solver.status import Status
 
@@ -58,10 +58,11 @@ _BEST = "The best duration is"
 
 
 def joint_minimum(
-    price: TimePrice,
-    lengths: Array,
     problem: TrajectoryProblem,
     path: DiscretePath,
+    price: TimePrice,
+    lengths: Array,
+    *,
     max_iterations: int,
     time_limit: float | None,
     near: bool = False,

@@ -151,8 +151,15 @@ def _solve(
             guess = stretched_path(guess, problem.grid, free.clock, now, np.array([length]))
             problem, now = job.lasting(free.clock, length).problem(), np.array([length])
             guess = problem.moved(guess)
-        known = free.price, now, problem, guess, most, time_limit
-        solution = joint_minimum(*known, barrier=job.barrier)
+        solution = joint_minimum(
+            problem,
+            guess,
+            free.price,
+            now,
+            max_iterations=most,
+            time_limit=time_limit,
+            barrier=job.barrier,
+        )
     if solution is None:
         solution = solve_on_grid(
             problem,
@@ -216,6 +223,8 @@ def explore(
     numbered = zip(one.numbers, one.solutions, strict=True)
     by_path = tuple(x.trajectory for number, x in numbered if number < len(first.paths))
     try:
+        if len(solutions) > 1:
+            _report(solutions, lost, starts, progress)
         while not (ended or pool.deadline.passed):
             tried = len(solutions) + len(lost)
             if tried >= starts:
@@ -225,14 +234,21 @@ def explore(
             solutions, lost = solutions + found.solutions, lost + found.lost
             stopped = found.interrupted
             ended = stopped or not found.solutions
-            best = min(solution.cost for solution in solutions)
-            text = f"{len(solutions)} of {starts} starts, least cost {best:.6g}"
-            progress(text, (len(solutions) + len(lost)) / starts)
+            _report(solutions, lost, starts, progress)
     except KeyboardInterrupt:
         record_interrupt()
         stopped = True
     minima = distinct(solutions)
     return Exploration(minima, len(solutions), stopped, tuple(lost), first, by_path)
+
+
+def _report(
+    solutions: Sequence[Solution], lost: Sequence[str], starts: int, progress: Progress
+) -> None:
+    """Say how many starts are done."""
+    best = min((solution.cost for solution in solutions), default=np.inf)
+    text = f"{len(solutions)} of {starts} starts, least cost {best:.6g}"
+    progress(text, (len(solutions) + len(lost)) / starts)
 
 
 def _first_starts(

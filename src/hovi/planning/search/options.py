@@ -122,8 +122,9 @@ class PlanOptions:
     )
     starts: int = whole_number(
         1,
-        "number of solves from seeded random perturbations; the best minima found are refined on "
-        "the requested grid and ranked there.",
+        "number of solves from seeded random perturbations, with a free duration from others "
+        "between its bounds first; the best minima found are refined on the requested grid and "
+        "ranked there.",
         least=1,
         key=SceneKey("a whole number, 1 or more", written=_always),
     )

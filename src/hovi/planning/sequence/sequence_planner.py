@@ -140,11 +140,14 @@ def plan_sequence(
     planned = partial(_planned, scene, begin, goals, checked, chosen, deadline, progress or silent)
     found, job = planned(free, free.first[0], began)
     for durations in free.first[1:]:
-        if found.status in STOPPED or (found.success and chosen.starts == 1):
+        done = found.success and (chosen.starts == 1 or deadline.passed)
+        if done or found.status in STOPPED:
             break
         other, its_job = planned(free, durations, began)
+        steps = found.nit + other.nit
         if not found.success or (other.success and other.cost < found.cost):
             found, job = other, its_job
+        found = dataclasses.replace(found, nit=steps)
     scenes = [each.acting.on(job.scene) for each in job.segments]
     return _named(with_notes(found, scenes, job.options, apart), checked)
 

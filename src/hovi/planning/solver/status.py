@@ -94,15 +94,17 @@ def status_of(
             f"a minimum of cost {cost:.10g} after {nit} steps.{left}",
         )
     if ended.why is Reason.STATIONARY:
-        curved = (
-            f"a saddle of cost {cost:.10g} with {n_neg} directions of negative curvature"
-            if n_neg > 0
-            else f"perhaps a saddle, of cost {cost:.10g}: rounding errors hide its curvature"
-        )
         advice = "solve again with escape_saddles=True or another guess"
-        return Status.SADDLE, f"{curved}; {advice}."
+        return Status.SADDLE, f"{saddle_in_words(cost, n_neg)}; {advice}."
     status, reason = unfinished(ended.why)
     return status, (
         f"{reason} after {nit} steps, before a minimum was found; the motion is the "
         f"best so far, of cost {cost:.10g}.{left}"
     )
+
+
+def saddle_in_words(cost: float, n_neg: int) -> str:
+    """A stationary motion that is no minimum, as a clause. n_neg: -1 if it is not known."""
+    if n_neg > 0:
+        return f"a saddle of cost {cost:.10g} with {n_neg} directions of negative curvature"
+    return f"perhaps a saddle, of cost {cost:.10g}: rounding errors hide its curvature"

@@ -9,15 +9,16 @@ import pytest
 import hovi
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import Grid
-from hovi.optimize.quadratic_model import QuadraticModel
+from hovi.optimize.bordered_model import BorderedModel
 from hovi.planning.problem.clock import Clock
 from hovi.planning.problem.limits import Limits, as_limits
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.problem.seams import Seam
+from hovi.planning.problem.time_price import TimePrice
 from hovi.planning.solver.bounded_action import BoundedAction
 from hovi.planning.solver.free_duration.timed_action import TimedAction
 from hovi.planning.solver.free_duration.timed_bounded_action import TimedBoundedAction
-from hovi.planning.solver.free_duration.timed_path import TimedPath, TimePrice
+from hovi.planning.solver.free_duration.timed_path import TimedPath
 from hovi.planning.solver.limits.limit_rows import LimitRows
 from hovi.schemes import galerkin
 from samples.asked_motions import two_link
@@ -51,7 +52,7 @@ def price_of(clock: Clock, count: int) -> TimePrice:
     return TimePrice(3.0, np.full(count, 0.01), np.full(count, 5.0), clock)
 
 
-def hessian_of(model: QuadraticModel) -> Array:
+def hessian_of(model: BorderedModel) -> Array:
     """The dense bordered Hessian."""
     inner, border = model.inner, model.border
     products = [

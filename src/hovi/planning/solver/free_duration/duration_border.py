@@ -48,8 +48,8 @@ class DurationBorder:
         """The derivatives if columns of what is kept change with s, too: see `kept_columns`.
 
         kept: u_j = j x_j = dx_j/ds of the columns x_j = h^j q^(j), zero elsewhere, shape (N, m, n);
-        the second derivative is j u_j. unknown: j where q^(j) is an unknown, zero elsewhere: its
-        steps change as much. order: k.
+        the second derivative is j u_j. unknown: j where q^(j) is an unknown, zero elsewhere: the
+        step of its column grows alike. order: k.
         """
         g, j = expansion.gradient, np.arange(order)
         bend = np.zeros_like(kept)
@@ -128,7 +128,7 @@ def _at_points(
 
 
 def _sums(columns: Array) -> Array:
-    """Of every interval, shape (N,)."""
+    """The sum over the columns of every interval, shape (N,)."""
     return np.asarray(columns.sum(axis=(1, 2)))
 
 

@@ -18,11 +18,12 @@ from hovi.planning.problem.clock import Clock
 from hovi.planning.problem.contradictions import contradiction
 from hovi.planning.problem.limits import Limits, no_limits
 from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.problem.time_price import TimePrice
 from hovi.planning.problem.tolerance import LAST_BARRIER
 from hovi.planning.solver.action_objective import MAX_BAND_INTERVALS
 from hovi.planning.solver.answer import Answer
 from hovi.planning.solver.free_duration.timed_action import TimedAction
-from hovi.planning.solver.free_duration.timed_path import TimedPath, TimePrice, stretched_path
+from hovi.planning.solver.free_duration.timed_path import TimedPath, stretched_path
 from hovi.planning.solver.free_duration.timed_search import minimum_within_limits
 from hovi.planning.solver.methods.interior_point import InteriorPoint, takes_rows
 from hovi.planning.solver.methods.method import Guess

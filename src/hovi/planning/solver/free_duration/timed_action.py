@@ -8,13 +8,10 @@ import numpy.typing as npt
 from hovi.optimize.quadratic_model import QuadraticModel
 from hovi.optimize.trust_region import Objective
 from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.problem.time_price import TimePrice
 from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.free_duration.timed_model import TimedModel, moved_in_time
-from hovi.planning.solver.free_duration.timed_path import (
-    TimedPath,
-    TimePrice,
-    stretched_problem,
-)
+from hovi.planning.solver.free_duration.timed_path import TimedPath, stretched_problem
 
 Array = npt.NDArray[np.float64]
 

@@ -8,19 +8,15 @@ import numpy.typing as npt
 from hovi.optimize.bounded_objective import BoundedObjective, Refinement
 from hovi.optimize.ended import Outputs
 from hovi.optimize.quadratic_model import QuadraticModel
+from hovi.planning.problem.time_price import TimePrice
 from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.bounded_action import BoundedAction
 from hovi.planning.solver.free_duration.duration_border import Forces
 from hovi.planning.solver.free_duration.row_border import RowForces
 from hovi.planning.solver.free_duration.timed_model import TimedModel, moved_in_time
-from hovi.planning.solver.free_duration.timed_path import (
-    TimedPath,
-    TimePrice,
-    stretched_problem,
-)
+from hovi.planning.solver.free_duration.timed_path import TimedPath, stretched_problem
 
 Array = npt.NDArray[np.float64]
-Index = npt.NDArray[np.intp]
 
 DURATION_METRIC = 400.0
 """Entry of log L in the metric: with the first radius of 20 it may change by 1, since only longer
@@ -43,12 +39,20 @@ class TimedBoundedAction(BoundedObjective[TimedPath]):
     def __init__(self, first: BoundedAction, price: TimePrice, lengths: Array) -> None:
         first.action.keep_points = True
         self.first, self.price, self.lengths = first, price, lengths
-        self.bounds, self.reopens = first.bounds, first.reopens
         self._at: dict[bytes, BoundedAction] = {}
         self._slopes: list[Array] = []
+        self._of_intervals = price.clock.parts(first.problem.grid, lengths)  # -1 for none
+        self._update()
         self._terms: tuple[Array, Array, Array] | None = None
         self._last = first  # that of the last model
         self._rates = np.zeros(0)  # d outputs / d log L of their parts, (R,)
+
+    def _update(self) -> None:
+        """Take over the outputs of the first action, whose rows may be new."""
+        self.bounds = self.first.bounds
+        self._parts = self._of_intervals[self.first.output_intervals]
+        # bounds cut more steps of several lengths, which move parts of the motion alone
+        self.reopens = self.first.reopens or not self.price.clock.whole
 
     def at(self, lengths: Array) -> BoundedAction:
         """The bounded action for lengths, in [s]; the first and the last two are kept."""
@@ -67,15 +71,9 @@ class TimedBoundedAction(BoundedObjective[TimedPath]):
         """The action for lengths, in [s]."""
         return self.at(lengths).action
 
-    @property
-    def parts(self) -> Index:
-        """The part of every output, -1 for none, shape (R,)."""
-        parts = self.price.clock.parts(self.first.problem.grid, self.lengths)
-        return parts[self.first.output_intervals]
-
     def fraction(self, lengths: Array) -> Array:
         """L0 / L, or 1 outside of parts, by which forces of limits count in the integral, (R,)."""
-        return np.append(self.lengths / lengths, 1.0)[self.parts]
+        return np.append(self.lengths / lengths, 1.0)[self._parts]
 
     def outputs(self, x: TimedPath) -> Outputs:
         """S + w sum L, and the bounded outputs relative to their ranges."""
@@ -110,7 +108,7 @@ class TimedBoundedAction(BoundedObjective[TimedPath]):
         forces = [Forces(*each) for each in zip(gradient, force, strict=True)]
         weights, own = at.plain(self.bounds.weights), at.row_outputs
         weighted = ((weights * at.plain(each))[own] for each in self._terms)
-        inside = self.price.clock.parts(at.problem.grid, x.lengths) >= 0
+        inside = self._of_intervals >= 0
         of_rows = RowForces(rows, inside, rows.columns("nodal"), rows.values(x.path), *weighted)
         model = TimedModel(at.action, x, inner, self.price, DURATION_METRIC, forces, of_rows)
         self._rates = self._rates_of(at, model, of_rows)
@@ -124,7 +122,7 @@ class TimedBoundedAction(BoundedObjective[TimedPath]):
 
     def push(self, step: Array, model: QuadraticModel) -> Array:
         """First-order change of the bounded outputs, shape (R,)."""
-        stretch = np.append(step[-len(self.lengths) :], 0.0)[self.parts]
+        stretch = np.append(step[-len(self.lengths) :], 0.0)[self._parts]
         return self._last.push_columns(model.gather(step)) + stretch * self._rates
 
     def pull(self, forces: Array, model: QuadraticModel) -> Array:
@@ -132,7 +130,7 @@ class TimedBoundedAction(BoundedObjective[TimedPath]):
         assert isinstance(model, TimedModel)
         columns = self._last.pull(self.fraction(model.x.lengths) * forces, model.inner)
         slopes = self.bounds.weights * forces * self._rates
-        return np.append(columns, np.bincount(self.parts + 1, slopes, len(self.lengths) + 1)[1:])
+        return np.append(columns, np.bincount(self._parts + 1, slopes, len(self.lengths) + 1)[1:])
 
     def accept(self, step: Array, model: QuadraticModel) -> None:
         """Use the outputs that the step predicts as weights of the next model's curvature."""
@@ -167,7 +165,7 @@ class TimedBoundedAction(BoundedObjective[TimedPath]):
         if found is not None:
             self.first = self._stretched(at, x.lengths, self.lengths)
             self._at.clear()
-            self.bounds, self.reopens = self.first.bounds, self.first.reopens
+            self._update()
         return found
 
     def retract(self, x: TimedPath, step: Array, model: QuadraticModel) -> TimedPath:

@@ -11,6 +11,7 @@ from hovi.optimize.banded_model import BandModel
 from hovi.optimize.bordered_model import Border, BorderedModel
 from hovi.optimize.equation_model import EquationModel
 from hovi.optimize.quadratic_model import QuadraticModel
+from hovi.planning.problem.time_price import TimePrice
 from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.free_duration.duration_border import (
     Forces,
@@ -18,12 +19,7 @@ from hovi.planning.solver.free_duration.duration_border import (
     stretch_of,
 )
 from hovi.planning.solver.free_duration.row_border import RowForces
-from hovi.planning.solver.free_duration.timed_path import (
-    TimedPath,
-    TimePrice,
-    kept_columns,
-    stretched_path,
-)
+from hovi.planning.solver.free_duration.timed_path import TimedPath, kept_columns, stretched_path
 
 Array = npt.NDArray[np.float64]
 ActionAt = Callable[[Array], ActionObjective]

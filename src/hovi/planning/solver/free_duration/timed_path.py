@@ -16,45 +16,11 @@ from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
-Mask = npt.NDArray[np.bool_]
 
 # called at each step
 _new_grid = without_checks(Grid)
 _new_lagrangian = without_checks(DiscreteLagrangian)
 _new_path = without_checks(DiscretePath)
-
-
-@dataclass(frozen=True, eq=False)
-class TimePrice:
-    """The price of time, and the bounds of the lengths of the free parts of a motion.
-
-    weight: w, in cost per [s]. lower, upper: in [s], shape (p,). clock: which parts.
-    """
-
-    weight: float
-    lower: Array
-    upper: Array
-    clock: Clock = Clock()
-
-    def with_given(self, lengths: Array, given: Mask) -> TimePrice:
-        """The price where some of the lengths are given, (p,) each."""
-        clock, free = self.clock.with_given(lengths, given), ~given
-        return TimePrice(self.weight, self.lower[free], self.upper[free], clock)
-
-    def of(self, lengths: Array) -> float:
-        """w times the sum of the lengths."""
-        return self.weight * float(lengths.sum())
-
-    def room(self, lengths: Array) -> tuple[Array, Array]:
-        """The least and the largest steps of log L at lengths within the bounds, (p,) each."""
-        low, high = np.log(self.lower / lengths), np.log(self.upper / lengths)
-        return np.minimum(low, 0.0), np.maximum(high, 0.0)
-
-    def after(self, lengths: Array, step: Array) -> Array:
-        """The lengths after a step of their logarithms, in [s]; exactly bounds where it ends."""
-        low, high = self.room(lengths)
-        moved = np.where(step <= low, self.lower, self.upper)
-        return np.where((low < step) & (step < high), lengths * np.exp(step), moved)
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,11 +34,11 @@ class TimedPath:
 def stretched_problem(
     problem: TrajectoryProblem, clock: Clock, now: Array, lengths: Array
 ) -> TrajectoryProblem:
-    """The problem for other lengths of its free parts, for solvers: it is not checked.
+    """The problem for other lengths of its free parts, for the steps of solvers: it is not checked.
 
-    For problems of which nothing but the discrete Lagrangian depends on the lengths, and whose
-    conditions do not depend on time: the structure of the Hessian depends on the proportions of the
-    steps alone.
+    Only the discrete Lagrangian is that of the new lengths: times of via points, seams and limits
+    stay those of the old ones, and no solver reads them. The structure of the Hessian depends on
+    the proportions of the steps alone.
     """
     if np.array_equal(lengths, now):
         return problem
@@ -83,7 +49,7 @@ def stretched_problem(
     object.__setattr__(stretched, "ld", ld)
     for name in ("torque_moments", "finer", "inertial_torque", "structure"):
         stretched.__dict__.pop(name, None)
-    if clock.whole:
+    if clock.whole:  # the proportions stay
         object.__setattr__(stretched, "structure", problem.structure)
     return stretched
 
@@ -99,7 +65,7 @@ def stretched_path(
     """
     k, ratios = path.order, clock.ratios(grid, now, lengths)
     nodes = clock.nodes(grid, now)
-    powers = ratios[:, None] ** np.arange(1.0, max(k, 2))  # (N, k - 1)
+    powers = ratios[:, None] ** np.arange(1.0, max(k, 2))
     at_nodes = np.concatenate([powers, powers[-1:]])
     inner = np.setdiff1d(nodes, [0, grid.intervals])
     at_nodes[inner] = 1.0
@@ -107,7 +73,7 @@ def stretched_path(
     z = path.z / (ratios**k)[:, None, None]
     for first, last in nodes:
         kept = np.zeros((last - first + 1, k, rates.shape[2]))
-        for node, interval in {(first, first), (last, last - 1)}:
+        for node, interval in ((first, first), (last, last - 1)):
             if node in inner:
                 kept[node - first, 1:] = rates[node] * (1.0 - 1.0 / powers[interval, :, None])
         if kept.any():

@@ -21,10 +21,11 @@ from hovi.optimize.interior_point import minimize_bounded
 from hovi.optimize.start import Start
 from hovi.planning.problem.limits import Limits
 from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.problem.time_price import TimePrice
 from hovi.planning.solver.answer import Answer, answered
 from hovi.planning.solver.augmented_lagrangian_rounds import spurious_sentence
 from hovi.planning.solver.free_duration.timed_bounded_action import TimedBoundedAction
-from hovi.planning.solver.free_duration.timed_path import TimedPath, TimePrice, stretched_path
+from hovi.planning.solver.free_duration.timed_path import TimedPath, stretched_path
 from hovi.planning.solver.methods.bounded_search import (
     EXACT_TOLERANCES,
     ROUGH_TOLERANCES,
@@ -38,7 +39,7 @@ from hovi.planning.solver.methods.limits_between_points import tightened, usable
 from hovi.planning.solver.methods.method import Guess
 from hovi.planning.solver.near.cleared_action import ClearedAction
 from hovi.planning.solver.outcome.cost_with_time import cost_of
-from hovi.planning.solver.status import Status, unfinished
+from hovi.planning.solver.status import Status, saddle_in_words, unfinished
 from hovi.system.dataclass import dataclass
 from hovi.system.deadline import raise_if_late
 
@@ -178,8 +179,7 @@ def _searched(search: TimedSearch) -> Answer:
     if reason:
         status, what = Status.INFEASIBLE, f"no motion within the limits was found: {reason}"
     elif n_neg != 0:
-        curved = f"{n_neg} directions of negative curvature"
-        status, what = Status.SADDLE, f"a saddle of cost {value:.10g} with {curved}"
+        status, what = Status.SADDLE, saddle_in_words(value, n_neg)
     instants, forces = search.forces(ended)
     central = search.central_path(ended) if status is Status.MINIMUM else None
     return Answer(

@@ -22,7 +22,13 @@ from hovi.planning.solver.methods.method import Guess, Method, Report
 from hovi.planning.solver.methods.torque_rates_last import with_torque_rates_last
 from hovi.planning.solver.non_finite import non_finite_condition, non_finite_sentence
 from hovi.planning.solver.outcome.cost_with_time import cost_of
-from hovi.planning.solver.status import Status, diverged, infeasible_sentence, unfinished
+from hovi.planning.solver.status import (
+    Status,
+    diverged,
+    infeasible_sentence,
+    saddle_in_words,
+    unfinished,
+)
 
 
 def takes_rows(problem: TrajectoryProblem) -> bool:
@@ -154,7 +160,4 @@ def _minimum(search: BoundedSearch, cost: float, excess: float) -> str:
 
 
 def _saddle(cost: float, n_neg: int) -> str:
-    return (
-        f"a saddle of cost {cost:.10g} with {n_neg} directions of negative curvature; solve again "
-        "with another guess."
-    )
+    return f"{saddle_in_words(cost, n_neg)}; solve again with another guess."
