@@ -422,3 +422,17 @@ def test_it_is_saved_certified_and_planned_again(name: str, tmp_path: Path) -> N
     apart = pin.difference(kind.robot.model, motion.q[seam(name, motion)], again.trajectory.q[node])
     free = np.isin(np.arange(kind.robot.nv), kind.scene.passive_coordinates) & bool(kind.left)
     assert np.abs(apart[~free]).max() < 1e-9
+
+
+@pytest.mark.parametrize("intervals", [2, 3, 7])
+def test_given_intervals_are_those_of_all_segments_together(intervals: int) -> None:
+    scene = hovi.Scene(with_shapes("two_link.urdf"), [hovi.effects.Gravity()])
+    segments = [hovi.Segment([0.3, 0.2], 0.4), hovi.Segment([0.6, -0.1], 1.0)]
+    given = {"intervals": intervals, "limits": "none", "self_collision": False}
+    found = hovi.plan_sequence(scene, [0.0, 0.0], segments, **given)
+    motion = found.trajectory
+    assert motion.grid.intervals == intervals
+    assert motion.segments is not None
+    assert min(motion.segments.intervals) >= 1
+    if intervals == 7:
+        assert motion.segments.intervals == (2, 5)  # nearly equal lengths

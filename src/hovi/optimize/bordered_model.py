@@ -154,9 +154,9 @@ def least_within(pivot: Array, slope: Array, low: Array, high: Array) -> Array:
 
     pivot: positive definite, (p, p).
     """
+    if len(slope) == 1:
+        return np.asarray(np.clip(-slope / pivot[0], low, high))
     t = np.asarray(np.linalg.solve(pivot, -slope), dtype=np.float64)
-    if len(t) == 1:
-        return np.clip(t, low, high)
     if ((low <= t) & (t <= high)).all():
         return t
     from scipy.optimize import lsq_linear  # takes a quarter of a second to import
@@ -169,4 +169,6 @@ def least_within(pivot: Array, slope: Array, low: Array, high: Array) -> Array:
 
 def _positive(matrix: Array) -> bool:
     """Whether a symmetric matrix is positive definite."""
+    if len(matrix) == 1:
+        return bool(matrix[0, 0] > 0)
     return bool(np.isfinite(matrix).all() and (np.linalg.eigvalsh(matrix) > 0).all())

@@ -170,7 +170,9 @@ def checked_segments(segments: Any, options: PlanOptions) -> tuple[Segment, ...]
                 )
     free = isinstance(duration_of(segments), tuple)
     if options.time_weight != 0 and not free:
-        raise InputError("time_weight needs a free duration, and those of segments are fixed.")
+        raise InputError(
+            "time_weight needs a free duration: give a segment a pair (lower, upper), in [s]."
+        )
     if free and len(segments) > 1 and stops_of(options):
         raise InputError(
             "via points and conditions at given times need segments of given durations: make them "

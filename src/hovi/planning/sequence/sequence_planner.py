@@ -128,7 +128,8 @@ def plan_sequence(
         return _alone(scene, start, checked[0], progress, chosen)
     if chosen.objective == "time":
         raise InputError(
-            'objective = "time" needs a free duration, and those of segments are fixed.'
+            'objective = "time" is for a single motion: for the segments of a sequence, give them '
+            "free durations and a large time_weight."
         )
     scene, begin, goals = _in_group(chosen.holding(scene), start, checked, chosen)
     scene = chosen.aiming(scene)

@@ -107,7 +107,9 @@ def moved_in_time(
     problem = action(before).problem
     ratios = clock.ratios(problem.grid, before, lengths)[:, None, None]
     kept, unknown = kept_columns(problem, x.path, clock, before)
-    columns = model.gather(step) * ratios**unknown
+    columns = model.gather(step)
+    if not clock.whole:
+        columns = columns * ratios**unknown
     at_ends = np.where(unknown > 0, 0.0, kept)  # `stretched_path` has the others
     if at_ends.any():
         orders = np.zeros((columns.shape[1], 1))

@@ -67,7 +67,7 @@ def stretched_path(
     nodes = clock.nodes(grid, now)
     powers = ratios[:, None] ** np.arange(1.0, max(k, 2))
     at_nodes = np.concatenate([powers, powers[-1:]])
-    inner = np.setdiff1d(nodes, [0, grid.intervals])
+    inner = nodes[(nodes > 0) & (nodes < grid.intervals)]
     at_nodes[inner] = 1.0
     rates = path.v[:, None] if k == 1 else path.rates
     z = path.z / (ratios**k)[:, None, None]
