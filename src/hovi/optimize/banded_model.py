@@ -230,6 +230,13 @@ class BandModel(QuadraticModel):
         border: further columns B, (size, p), and their corner C; the count is that of
             [H B; B^T C].
         """
+        try:
+            return self._negative_pivots(border)
+        except np.linalg.LinAlgError:
+            return -1
+
+    def _negative_pivots(self, border: tuple[Array, Array] | None) -> int:
+        """See negative_eigenvalues. Raises LinAlgError for a singular block."""
         bands = self.layout.assemble(self.intervals.hessian)
         size, block = self.layout.size, max(bands.shape[1], 1)
         count = 0
@@ -245,10 +252,7 @@ class BandModel(QuadraticModel):
             pivot += np.tril(pivot, -1).T
             if first:
                 coupling = _dense(bands, range(first, last), range(first - block, first))
-                try:
-                    pivot -= coupling @ np.linalg.solve(schur, coupling.T)
-                except np.linalg.LinAlgError:
-                    return -1
+                pivot -= coupling @ np.linalg.solve(schur, coupling.T)
                 columns[first:last] -= coupling @ solved
             schur = (pivot + pivot.T) / 2
             if border is not None:

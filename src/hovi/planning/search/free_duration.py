@@ -139,13 +139,12 @@ class BestDuration:
         best, weight = self.solution, self.free.weight
         T = best.trajectory.duration
         cost = action_of(best) + weight * T
-        parts = f"{cost:.10g}, {weight * T:.6g} of it for time, after {self.steps} steps"
+        parts = cost_in_parts(cost, weight * T, self.steps)
         message = f"{best.message} {self.ending} {T:.10g} s."
         if best.success:
             message = f"a minimum of cost {parts}. {self.ending} {T:.10g} s."
         elif self.reason:
-            so_far = f"the motion is the best so far, of cost {parts}"
-            message = f"{self.reason}; {so_far}. {self.ending} {T:.10g} s."
+            message = f"{best_so_far(self.reason, parts)}. {self.ending} {T:.10g} s."
         elif weight > 0:
             message = f"{message} Time adds {weight * T:.6g} to the cost."
         return dataclasses.replace(
@@ -403,6 +402,16 @@ def _jumps(a: _Trial, b: _Trial) -> bool:
     step = abs(a.duration - b.duration)
     explained = max(2 * max(abs(a.slope), abs(b.slope)) * step, MIN_JUMP * abs(a.total))
     return a.gap_to(b) <= JUMP_BRACKET and abs(a.total - b.total) > explained
+
+
+def cost_in_parts(cost: float, time: float, steps: int) -> str:
+    """A cost with the price of time in it, and after how many steps it was reached."""
+    return f"{cost:.10g}, {time:.6g} of it for time, after {steps} steps"
+
+
+def best_so_far(reason: str, parts: str) -> str:
+    """Why a search ended, a clause, and what its motion costs: see `cost_in_parts`."""
+    return f"{reason}; the motion is the best so far, of cost {parts}"
 
 
 def action_of(solution: Solution) -> float:

@@ -23,6 +23,8 @@ from hovi.planning.search.free_duration import (
     BestDuration,
     FreeDuration,
     action_of,
+    best_so_far,
+    cost_in_parts,
     ended_search,
 )
 from hovi.planning.search.job import Job
@@ -41,6 +43,7 @@ MAX_SWEEPS = 10
 """Maximum number of searches for the duration of every segment."""
 
 Array = npt.NDArray[np.float64]
+Mask = npt.NDArray[np.bool_]
 SolverOf = Callable[[Job, Clock], OnGrid]
 """Returns a solver of a job on a grid, whose free part has each length."""
 JointSolveOf = Callable[[TimePrice, Array, Solution], Solution | None]
@@ -73,9 +76,15 @@ class FreeSegments:
         return [means, longest] if self.any else [longest]
 
     @property
+    def chosen(self) -> Mask:
+        """Which durations are free, one for each segment."""
+        lower, upper = np.array(self.bounds).T
+        return np.asarray(lower < upper)
+
+    @property
     def any(self) -> bool:
         """Whether any duration is free."""
-        return any(lower < upper for lower, upper in self.bounds)
+        return bool(self.chosen.any())
 
     def part(self, number: int, job: Job) -> FreeDuration | None:
         """The duration of a segment, with those of a job in the others; None for a given one."""
@@ -89,7 +98,7 @@ class FreeSegments:
         """The price of time of all free segments. lengths: of all segments, in [s]."""
         lower, upper = np.array(self.bounds).T
         clock = Clock.of_parts(len(lower))
-        return TimePrice(self.weight, lower, upper, clock).with_given(lengths, lower == upper)
+        return TimePrice(self.weight, lower, upper, clock).with_given(lengths, ~self.chosen)
 
 
 def best_segments(
@@ -124,7 +133,7 @@ def _all_at_once(
     """The job and the motion by one solve for all durations; None where that does not succeed."""
     now = np.diff(_ends(job))
     price = free.all_parts(now)
-    found = jointly(price, now[[lower < upper for lower, upper in free.bounds]], first)
+    found = jointly(price, now[free.chosen], first)
     problem = None if found is None else found.problem
     if found is None or problem is None:
         return None
@@ -139,12 +148,10 @@ def _all_at_once(
 
 def _stopped(found: Solution, weight: float) -> Solution:
     """The best motion of a solve that was stopped, whose message counts all steps and the time."""
-    T, cost = found.trajectory.duration, action_of(found)
-    message = (
-        f"{ended_search(found.status)}; the motion is the best so far, of cost "
-        f"{cost + weight * T:.10g}, {weight * T:.6g} of it for time, after {found.nit} steps."
-    )
-    return dataclasses.replace(found, cost=cost + weight * T, message=message)
+    time = weight * found.trajectory.duration
+    cost, why = action_of(found) + time, ended_search(found.status)
+    message = f"{best_so_far(why, cost_in_parts(cost, time, found.nit))}."
+    return dataclasses.replace(found, cost=cost, message=message)
 
 
 def _one_by_one(

@@ -26,7 +26,6 @@ from hovi.planning.problem.notation.goal_turns import says_turns
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.search.free_duration import FreeDuration
 from hovi.planning.search.job import Job
-from hovi.planning.solver.free_duration.timed_path import stretched_path
 from hovi.planning.solver.solver import Solution, solve_on_grid
 from hovi.planning.solver.status import Status
 from hovi.robot.robot import Robot
@@ -144,7 +143,9 @@ def _solve(
     problem, most = job.problem(), job.options.max_iterations
     solution = None
     if free is not None:
-        from hovi.planning.search.joint_duration import joint_minimum  # rarely needed
+        # Here, since most plans have a given duration, and start without these modules.
+        from hovi.planning.search.joint_duration import joint_minimum
+        from hovi.planning.solver.free_duration.timed_path import stretched_path
 
         now = np.array([free.clock.length(problem.grid)])
         if length is not None:

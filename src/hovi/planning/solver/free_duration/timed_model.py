@@ -34,7 +34,8 @@ class TimedModel(BorderedModel):
     T^3 integral |da|^2, in which a motion of 1 rad between rests has the squared length 12.
     forces: of limits at the points, per batch; none if None. rows: of limits between them.
     parts: the part of every interval, -1 for none, (N,). kept: columns that change with log L of
-    their part, to first order, (N, m, n). stretches: the same of the jets at the points, per batch.
+    their part, to first order, (N, m, n). unknown: see `kept_columns`. stretches: the changes of
+    the jets at the points, per batch.
     """
 
     def __init__(
@@ -61,9 +62,9 @@ class TimedModel(BorderedModel):
         known = duration_border(problem.ld, self.expansion, jets, inside, forces)
         if rows is not None:
             known = rows.added_to(known)
-        self.kept, unknown = kept_columns(problem, x.path, price.clock, x.lengths)
-        if self.kept.any() or unknown.any():
-            known = known.with_ends(self.expansion, self.kept, unknown, problem.ld.k)
+        self.kept, self.unknown = kept_columns(problem, x.path, price.clock, x.lengths)
+        if self.kept.any() or self.unknown.any():
+            known = known.with_ends(self.expansion, self.kept, self.unknown, problem.ld.k)
         cost, own = price.weight * x.lengths, np.arange(len(x.lengths)) == self.parts[:, None]
         columns = [inner.scatter(known.column * of[:, None, None]) for of in own.T]
         border = Border(
@@ -101,16 +102,17 @@ def moved_in_time(
     """The motion after a step: stretched to its new lengths, then moved in the columns.
 
     What is kept where parts begin and end has columns that change with the lengths.
+    model: at x.
     """
+    assert isinstance(model, TimedModel)
     before, clock = x.lengths, price.clock
     lengths = price.after(before, step[-len(before) :])
     problem = action(before).problem
     ratios = clock.ratios(problem.grid, before, lengths)[:, None, None]
-    kept, unknown = kept_columns(problem, x.path, clock, before)
     columns = model.gather(step)
     if not clock.whole:
-        columns = columns * ratios**unknown
-    at_ends = np.where(unknown > 0, 0.0, kept)  # `stretched_path` has the others
+        columns = columns * ratios**model.unknown
+    at_ends = np.where(model.unknown > 0, 0.0, model.kept)  # `stretched_path` has the others
     if at_ends.any():
         orders = np.zeros((columns.shape[1], 1))
         orders[: 2 * x.path.order, 0] = np.tile(np.arange(x.path.order), 2)
