@@ -6,6 +6,7 @@ import dataclasses
 from collections.abc import Callable
 
 from hovi.accuracy.budget import Budget
+from hovi.accuracy.lighter_rotors import lighter_rotors
 from hovi.accuracy.resolved_motion import ResolvedMotion, resolve
 from hovi.discrete.grid import Grid
 from hovi.discrete.trajectory import Trajectory
@@ -16,7 +17,6 @@ from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.refinement.adaptive import MAX_FIRST_INTERVALS
 from hovi.planning.refinement.hp_refinement import galerkin_with_more_points
 from hovi.planning.refinement.inactive_limits import far_from_limits
-from hovi.planning.search.homotopies import lighter_rotors
 from hovi.planning.search.job import Job, split_for_charts
 from hovi.planning.search.options import DEFAULT_TOLERANCE, PlanOptions
 from hovi.planning.search.planner import plan

@@ -28,10 +28,7 @@ LEAST_GAP = 1e-16
 MAX_DUAL_RATIO = 1e8
 """Largest ratio, either way, of a multiplier and mu over its gap."""
 FRACTION_TO_BOUNDARY = 0.99
-"""Largest fraction of the distance to a bound in one step while mu is large."""
-LARGEST_FRACTION = 1.0 - 1e-4
-"""The same when mu is small: a slack nearer to its bound than mu over its multiplier takes a gap
-below rounding errors."""
+"""Largest fraction of the distance to a bound in one step."""
 SLACK_MATCHED = 1e-9
 """Largest |y - s| at which the slack has reached its output and limits the length of a step."""
 
@@ -148,25 +145,6 @@ class Barrier:
             z[old:][known] = np.maximum(z[old:][known], former[origin[known]])
         return whole._clipped()
 
-    def transferred(self, y: Array, new: Index, nearby: Index) -> Barrier:
-        """New outputs below their lower bounds take over the multipliers of kept ones near them.
-
-        We assume that all of these increase together until the new ones reach their bounds: slacks
-        are where they will be then, with products z gap of mu.
-        y: outputs, (R,). new, nearby: see Refinement.transfer.
-        """
-        rise = np.maximum(self.bounds.lower[new] - y[new], 0.0)
-        below = rise > 0.0
-        new, nearby, rise = new[below], nearby[below], rise[below]
-        s, zl = self.s.copy(), self.zl.copy()
-        zl[new] = 0.0
-        np.add.at(zl, new, self.zl[nearby])
-        zl[new] = np.maximum(zl[new], self.mu / INITIAL_MARGIN)
-        s[new] = self.bounds.lower[new] + self.mu / zl[new]
-        s[nearby] = self.s[nearby] + rise
-        zl[nearby] = self.mu / (s[nearby] - self.bounds.lower[nearby])
-        return dataclasses.replace(self, s=s, zl=zl)._clipped()
-
     def _moved_inside(self, change: Array, kept: Index) -> Array:
         """The change of outputs that have one bound and move away from it; 0 of others."""
         bounds = self.bounds
@@ -221,7 +199,7 @@ class Barrier:
     def aim(self, y: Array, dy: Array, targets: Pair) -> Direction:
         """The Newton direction that belongs to a change dy, with products that aim at targets."""
         ds, dzl, dzu = (np.empty_like(y) for _ in range(3))
-        limits = SLACK_MATCHED, self.boundary_fraction
+        limits = SLACK_MATCHED, FRACTION_TO_BOUNDARY
         ends = native.aim(*self.arrays, y, dy, *targets, *limits, ds, dzl, dzu)
         return Direction(dy, ds, dzl, dzu, *ends)
 
@@ -251,8 +229,8 @@ class Barrier:
     def merit(self, y: Array, penalty: float, along: Direction, fraction: float) -> float:
         """The barrier plus penalty sum weights |y - s| after a fraction of a direction."""
         w, d = self.bounds.weights, along
-        keep = self.boundary_fraction
-        return native.merit(*self.arrays, w, y, d.dy, d.ds, fraction, keep, self.mu, penalty)
+        numbers = fraction, FRACTION_TO_BOUNDARY, self.mu, penalty
+        return native.merit(*self.arrays, w, y, d.dy, d.ds, *numbers)
 
     def moved(self, y: Array, along: Direction, fraction: float, penalty: float) -> Barrier:
         """Slacks after a fraction of a direction, multipliers as far as they stay positive.
@@ -261,7 +239,7 @@ class Barrier:
         the merit.
         """
         s, zl, zu = (np.empty_like(y) for _ in range(3))
-        keep = self.boundary_fraction
+        keep = FRACTION_TO_BOUNDARY
         dual = 1.0 if along.dual >= 1.0 else keep * along.dual
         d = (along.ds, along.dzl, along.dzu)
         numbers = (fraction, dual, keep, self.mu, penalty, MAX_DUAL_RATIO)
@@ -300,11 +278,6 @@ class Barrier:
     def complementarity(self) -> float:
         """The largest |z gap - mu|."""
         return native.largest_miss(*self.arrays, self.mu)
-
-    @property
-    def boundary_fraction(self) -> float:
-        """Largest fraction of a gap that one step takes."""
-        return min(max(FRACTION_TO_BOUNDARY, 1.0 - self.mu / self.scale), LARGEST_FRACTION)
 
     def _clipped(self) -> Barrier:
         """Multipliers limited to a range around the central path, zero where there is no bound."""

@@ -22,13 +22,10 @@ class Refinement(NamedTuple):
 
     kept: numbers of those that remain, ascending; the new ones follow them.
     origin: number of the former output at the place of each new one; -1 for none.
-    transfer: numbers, as they are now, of new outputs and of kept ones near them, whose multipliers
-        are transferred to new ones outside their lower bounds. A kept output occurs once.
     """
 
     kept: Index
     origin: Index
-    transfer: tuple[Index, Index] | None = None
 
 
 class BoundedObjective(ABC, Generic[X]):

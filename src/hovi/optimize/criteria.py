@@ -25,8 +25,6 @@ class Criteria:
     radius: first radius of the trust region, in the metric; with bounds: BoundedObjective.radii.
     escape_saddles: leave a saddle along negative curvature; False stops there.
     exact: stop only where rounding alone remains, after a Newton step of an exact model.
-    plain: with bounds, take plain steps alone, each barrier parameter until its problem is solved:
-        slower, and more robust.
     barrier: its last parameter, relative to the mean density of the objective.
     enough: with bounds, stop within them where a whole Newton step predicts a smaller decrease,
         relative to the value, even if it would be cut short.
@@ -43,7 +41,6 @@ class Criteria:
     barrier: float = 1e-10
     enough: float = 0.0
     stalled: float = 0.0
-    plain: bool = False
 
     def rough(self) -> Criteria:
         """The same for a solve that is to come near a solution only."""

@@ -91,7 +91,6 @@ class Ended(Generic[X, Z]):
         Hessian that is positive definite, under equations on their tangent space.
     saddles: values at the saddles that were left along negative curvature.
     saved: the last iterates before the mean product z gap had halved, with that product.
-    corrected: whether some steps were corrected ones, without which it may end otherwise.
     kept: the point of least objective so far that keeps the bounds to KEPT, and the outputs there;
         None for none. It is the final point where time runs out.
     """
@@ -105,7 +104,6 @@ class Ended(Generic[X, Z]):
     convex: bool = False
     saddles: list[float] = field(default_factory=list)
     saved: list[tuple[float, X]] = field(default_factory=list)
-    corrected: bool = False
     kept: tuple[X, Outputs] | None = None
     _measured: tuple[Array, Array, float] | None = field(default=None, init=False, repr=False)
 

@@ -35,7 +35,7 @@ import numpy.typing as npt
 
 from hovi.optimize.barrier import Barrier
 from hovi.optimize.bounded_objective import BoundedObjective, Refinement
-from hovi.optimize.bounded_steps import MATCHED, SHORT_FRACTION, BoundedStep, BoundedSteps
+from hovi.optimize.bounded_steps import SHORT_FRACTION, BoundedStep, BoundedSteps
 from hovi.optimize.criteria import Criteria
 from hovi.optimize.ended import FEASIBILITY_TOLERANCE, Ended, Iteration, Reason
 from hovi.optimize.quadratic_model import QuadraticModel, decrease_ratio, next_shift
@@ -66,8 +66,6 @@ that an inexact model led to, and the least distance of slacks from their bounds
 the range, per barrier parameter."""
 REOPENED_LEVEL = 0.3
 """The least such parameter, relative to the mean product of multipliers and gaps."""
-SAVED_AGAIN = 1.5
-"""A saved iterate is replaced while the mean product is below this many times its first one."""
 MAX_REFINEMENTS = 40
 """Maximum number of refinements."""
 CUT_FRACTION, MOST_CUT, RAISED = 0.5, 4, 10.0
@@ -76,28 +74,16 @@ where it is), the number of such steps in a row after which the barrier paramete
 it has fallen too early, and the factor by which it is raised."""
 LEAST_RAISED_GAP = 1e-9
 """Least distance of slacks from their bounds after that, relative to the range."""
-MOST_TRANSFERRED = 5e-3
-"""How far outside its bounds a new output may be to which multipliers are transferred."""
-OUTSIDE_RADIUS = 3.0
-"""Radius to which the trust region is cut where outputs are added outside of their bounds; the one
-before is restored once outputs are matched."""
 DENSITY_FLOOR = 1e-9
 """Mean density of the initial objective below which 1 is used as its scale."""
 MAX_FORCE = 1e12
 """Multiplier, relative to the mean density, above which the bounds are taken as impossible."""
-SHORT_LENGTH, NO_LENGTH = 1e-4, 1e-8
-"""Length of a step, relative to a radius of at least 1, that is no progress where bounds are not
-satisfied, and its length that is none anywhere."""
 MAX_STALLED_STEPS = 12
 """Consecutive steps without progress after which the iteration ends as diverged."""
 MAX_UNMET = 4
 """Steps that predict next to nothing after which it ends although equations do not hold."""
 MAX_SADDLES = 5
 """Number of saddles from which steps along negative curvature go on."""
-MAX_SLOW_STEPS = 40
-"""Steps after which it ends as diverged if |y - s| was large in all and has hardly fallen."""
-SLOW_DECREASE, LARGE_VIOLATION = 0.1, 1e-3
-"""The least relative decrease of |y - s| in these steps, and the |y - s| above which it counts."""
 
 
 def minimize_bounded(
@@ -135,14 +121,12 @@ class _Iteration(BoundedSteps[X]):
         report: Callable[[int, float], None] | None,
     ) -> None:
         super().__init__(objective, ended, criteria, density)
-        self.plain = self.cautious = criteria.plain
         self.report = report
         self.stalled = self.unmet = 0
-        self.violations: list[float] = []
         self.level = FIRST_REFINEMENT
         self.refinements = self.reopenings = self.saddles = 0
         self.first_product = 0.0
-        self.cut, self.radius_to_restore = 0, 0.0
+        self.cut = 0
 
     def run(self) -> None:
         """Iterate until stationary, or until a limit is reached."""
@@ -200,14 +184,12 @@ class _Iteration(BoundedSteps[X]):
         ended.steps.append(Iteration(outputs.value, step.decrease, ratio, trial.shift, self.radius))
         if self.report is not None:
             self.report(len(ended.steps), outputs.value)
-        length = trial.norm * step.fraction
         last, radius = self.radius, self.radius_after(step, ratio)
         self.shift = next_shift(trial.shift, trial.norm, radius)
         self.radius = radius
-        short = length < SHORT_LENGTH * max(1.0, radius)
-        stalled = ratio <= 1e-4 or (short and not (ended.feasible and length > NO_LENGTH))
-        self.stalled = self.stalled + 1 if stalled else 0
-        if ratio <= 1e-4:
+        refused = ratio <= 1e-4
+        self.stalled = self.stalled + 1 if refused else 0
+        if refused:
             if not self.cautious:  # the same again, as a plain step
                 self.radius = last
             self._hold(step.reaction, -1.0)
@@ -221,12 +203,8 @@ class _Iteration(BoundedSteps[X]):
         if self.cautious:
             self._reduce_mu(step)
         self._raise_mu(step)
-        self.cautious = self.plain
+        self.cautious = False
         self.product = ended.z.mean_product()
-        violation = ended.violation
-        if violation <= MATCHED:
-            self.radius, self.radius_to_restore = max(self.radius, self.radius_to_restore), 0.0
-        self.violations.append(violation)
         self._save(x)
         return True
 
@@ -237,13 +215,11 @@ class _Iteration(BoundedSteps[X]):
         return self.objective.hold(self.ended.x, sign * reaction)
 
     def _save(self, x: X) -> None:
-        """Save an iterate: the last one before the product halves."""
+        """Save an iterate whenever the product has halved."""
         product, saved = self.product, self.ended.saved
         if not saved or product < 0.5 * self.first_product:
             self.first_product = product
             saved.append((product, x))
-        elif product <= SAVED_AGAIN * self.first_product:
-            saved[-1] = min(product, self.first_product), x
 
     def _end(self, model: QuadraticModel) -> None:
         """End at a stationary point with its exact model."""
@@ -259,12 +235,7 @@ class _Iteration(BoundedSteps[X]):
 
     def _is_hopeless(self) -> bool:
         """Whether the bounds seem impossible to satisfy from here."""
-        slow = False
-        if len(self.violations) > MAX_SLOW_STEPS:
-            last = self.violations[-MAX_SLOW_STEPS - 1 :]
-            slow = min(last) > LARGE_VIOLATION and last[-1] > (1 - SLOW_DECREASE) * last[0]
-        stalled = self.stalled >= MAX_STALLED_STEPS
-        return stalled or slow or self.penalty > MAX_FORCE * self.density
+        return self.stalled >= MAX_STALLED_STEPS or self.penalty > MAX_FORCE * self.density
 
     def _reopened(self) -> bool:
         """Whether the slacks were moved away from their bounds again, to go on from there."""
@@ -286,9 +257,7 @@ class _Iteration(BoundedSteps[X]):
         self._drop_saved(mu)
         self.product = ended.z.mean_product()
         self.shift, self.radius = 0.0, max(self.radius, 1.0)
-        self.radius_to_restore = 0.0
-        self.stalled, self.cautious = 0, self.plain
-        self.violations.clear()
+        self.stalled, self.cautious = 0, False
 
     def _drop_saved(self, mu: float) -> None:
         """Drop saved iterates with a smaller barrier parameter: they are no longer on the way."""
@@ -360,16 +329,7 @@ class _Iteration(BoundedSteps[X]):
         barrier = ended.z.refined(
             self.objective.bounds, outputs.y, found.kept, found.origin, before
         )
-        beyond = barrier.outside(outputs.y)
-        if beyond[len(found.kept) :].any():
-            self.radius_to_restore = max(self.radius, self.radius_to_restore)
-            self.radius = min(self.radius, OUTSIDE_RADIUS)
-        if found.transfer is not None:
-            new, nearby = found.transfer
-            near = beyond[new] <= MOST_TRANSFERRED
-            barrier = barrier.transferred(outputs.y, new[near], nearby[near])
-            beyond[new[near]] = 0.0
-        outside = float(beyond[len(found.kept) :].max(initial=0.0))
+        outside = float(barrier.outside(outputs.y)[len(found.kept) :].max(initial=0.0))
         mu = min(REOPENED * outside, MOST_REOPENED) * self.density
         if mu > barrier.mu:  # room for the others to move
             margin = REOPENED * outside

@@ -370,7 +370,7 @@ def test_an_estimate_for_one_tip_certifies_no_other(two_arms: Robot) -> None:
     assert measured is not None
     assert other.frame == "right_gripper"
     assert other.largest_tip == pytest.approx(measured.largest_tip, rel=1e-12)
-    assert other.largest_tip > 2 * known.largest_tip
+    assert abs(other.largest_tip / known.largest_tip - 1.0) > 1e-3
     unknown = certify(solution, "right_gripper", estimate=False)
     assert unknown.errors is None
     assert "takes another solve" in unknown.missing["errors"]

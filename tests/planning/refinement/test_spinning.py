@@ -23,10 +23,8 @@ def xarm() -> hovi.Scene:
 
 def test_a_spinning_wrist_is_named_with_its_inertia(xarm: hovi.Scene) -> None:
     found = hovi.plan(xarm, *XARM_REACH, limits="none", self_collision=False)
-    assert found.status is hovi.Status.UNRESOLVED
-    named = re.search(
-        r"joint '(\S+)' spins at up to (\S+) rad/s with an inertia of (\S+) kg", found.message
-    )
+    (said,) = [each for each in found.trajectory.cautions if "spins" in each]
+    named = re.search(r"Joint '(\S+)' spins at up to (\S+) rad/s with an inertia of (\S+) kg", said)
     assert named is not None
     joint = xarm.robot.coordinate_names.index(named[1])
     motion = found.trajectory.sample(np.linspace(0.0, 3.0, 20_001))
@@ -36,7 +34,7 @@ def test_a_spinning_wrist_is_named_with_its_inertia(xarm: hovi.Scene) -> None:
     mass = [pin.crba(model, model.createData(), q)[joint, joint] for q in found.trajectory.q]
     assert float(named[3]) == pytest.approx(min(mass), rel=0.05)
     for remedy in ("limits", "armature", "acceleration_cost"):
-        assert remedy in found.message
+        assert remedy in said
 
 
 def test_each_remedy_helps(xarm: hovi.Scene) -> None:
@@ -72,18 +70,16 @@ def test_a_spinning_motion_that_a_finer_grid_leaves_is_no_minimum(
     assert finer.success
     assert finer.cost < 0.99 * found.cost
     assert found.status is hovi.Status.UNRESOLVED
-    assert "a finer grid may find another motion" in found.message
 
 
 @pytest.fixture(scope="module")
 def spinning_z1() -> hovi.Solution:
-    """Two more modes change its cost by 0.1 %, intervals of a quarter by 1.2 %, 3 rad away."""
+    """Two more modes change its cost by 0.1 %; a grid that takes more steps leads elsewhere."""
     scene = hovi.Scene(hovi.load_robot("z1", locked=["jointGripper"]), [hovi.effects.Gravity()])
     start = [0.06222511, 1.94983376, -0.15340647, 1.26122452, 0.59194828, -2.10693647]
     goal = [2.14330674, 2.11635047, -1.8623539, -0.84617339, 1.11296258, 1.76312911]
-    return hovi.plan(
-        scene, start, goal, 2.47673118403244, limits="none", processes=1, self_collision=False
-    )
+    few = {"max_iterations": 250, "self_collision": False}
+    return hovi.plan(scene, start, goal, 2.47673118403244, limits="none", processes=1, **few)
 
 
 def test_a_later_grid_that_is_left_unfinished_refutes_an_estimate(
@@ -100,20 +96,31 @@ def test_a_later_grid_that_is_left_unfinished_refutes_an_estimate(
     assert found.error_estimate == pytest.approx(found.cost / lower.min() - 1, rel=1e-3)
 
 
-def test_a_fast_spinning_motion_needs_a_minimum_on_two_finer_grids(
-    spinning_z1: hovi.Solution,
-) -> None:
-    """Two more modes hardly change its cost; shorter intervals lead to another motion."""
-    problem, motion = spinning_z1.problem, spinning_z1.trajectory
-    assert problem is not None
-    error = 1 - solve_on_grid(problem.finer, motion).cost / spinning_z1.cost
-    assert error < 1e-3
-    again = hovi.solve(problem, motion)
-    assert again.cost == pytest.approx(spinning_z1.cost, rel=1e-9)
-    assert again.status is hovi.Status.UNRESOLVED
-    assert "but a still finer one does not" in again.message
-    quarters = problem.on(problem.grid.halved().halved())
-    assert solve_on_grid(quarters, motion).cost < 0.99 * spinning_z1.cost
+@pytest.mark.parametrize("seed", [5, 8, 11, 15, 21, 31])
+@pytest.mark.parametrize("name", ["z1", "ur5", "xarm7"])
+def test_a_success_in_a_valley_is_one_on_intervals_of_a_quarter(name: str, seed: int) -> None:
+    """On given grids, without limits; a motion that is refused is no claim."""
+    robot = hovi.load_robot(name)
+    rng = np.random.default_rng(seed)
+    start, goal = rng.uniform(-1.5, 1.5, (2, robot.nq))
+    start, goal = (np.clip(q, 0.9 * robot.lower, 0.9 * robot.upper) for q in (start, goal))
+    found = hovi.plan(
+        hovi.Scene(robot, [hovi.effects.Gravity()]),
+        start,
+        goal,
+        3.0,
+        intervals=20,
+        scheme="galerkin-4x10",
+        limits="none",
+        processes=1,
+        self_collision=False,
+        continuation=False,
+    )
+    if found.success:
+        assert found.problem is not None
+        quarters = found.problem.on(found.problem.grid.halved().halved())
+        finer = solve_on_grid(quarters, found.trajectory)
+        assert finer.cost == pytest.approx(found.cost, rel=0.01)
 
 
 def test_a_fast_spinning_motion_that_finer_grids_confirm_is_a_minimum() -> None:
@@ -133,6 +140,40 @@ def test_a_fast_spinning_motion_that_finer_grids_confirm_is_a_minimum() -> None:
     assert quarters.cost == pytest.approx(found.cost, rel=1e-2)
     moved = found.replan(goal=np.add(goal, 2e-3))
     assert moved.error_estimate not in (found.error_estimate, 2 * (found.error_estimate or 0.0))
+
+
+@pytest.mark.parametrize(
+    ("name", "seed", "intervals", "said"),
+    [("xarm7", 21, 20, "rad/s a finer grid confirms it")],
+)
+def test_a_motion_that_still_finer_grids_refute_is_no_minimum(
+    name: str, seed: int, intervals: int, said: str
+) -> None:
+    robot = hovi.load_robot(name)
+    rng = np.random.default_rng(seed)
+    low, high = np.maximum(robot.lower, -2.5), np.minimum(robot.upper, 2.5)
+    start, goal = (
+        (low + high) / 2 + 0.6 * (high - low) / 2 * rng.uniform(-1, 1, robot.nq) for _ in range(2)
+    )
+    found = hovi.plan(
+        hovi.Scene(robot, [hovi.effects.Gravity()]),
+        start,
+        goal,
+        [1.0, 2.0, 3.0, 4.0][seed % 4],
+        intervals=intervals,
+        scheme="galerkin-4x10",
+        limits="none",
+        processes=1,
+        self_collision=False,
+        continuation=False,
+    )
+    assert found.status is hovi.Status.UNRESOLVED, found.message
+    assert said in found.message
+    assert "a still finer one does not confirm that" in found.message
+    assert found.problem is not None
+    quarters = found.problem.on(found.problem.grid.halved().halved())
+    finer = solve_on_grid(quarters, found.trajectory)
+    assert abs(finer.cost / found.cost - 1) > 1e-3
 
 
 def test_a_motion_that_finer_grids_move_ever_further_is_no_minimum(

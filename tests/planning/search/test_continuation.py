@@ -19,7 +19,7 @@ from samples.stopped_searches import InterruptedEvaluations, LeapingClock
 from samples.uneven_chain import uneven_chain
 
 STEPS = 300
-"""Too few steps for a direct solve with a light hand, which takes some 500; enough per stage."""
+"""Too few steps for a direct solve with a light hand, which takes some 500."""
 
 GRID: dict[str, Any] = {"scheme": "galerkin-2", "intervals": 16, "limits": "none"}
 
@@ -56,7 +56,7 @@ class Reports:
                 self._act()
 
 
-def test_masses_of_a_million_to_one_are_solved_with_decreasing_rotor_inertia(
+def test_masses_of_a_million_to_one_are_solved_by_more_steps(
     light_hand: Scene, failed: Solution
 ) -> None:
     """A minimum of the task itself, without rotors, on a grid that does not resolve it."""
@@ -74,9 +74,7 @@ def test_masses_of_a_million_to_one_are_solved_with_decreasing_rotor_inertia(
     texts, shares = zip(*reports.continued, strict=True)
     assert list(shares) == sorted(shares)
     assert 0 <= shares[0] <= shares[-1] <= 1
-    rotors = [float(text.split()[5]) for text in texts[:-1] if "rotors" in text]
-    np.testing.assert_allclose(np.divide(rotors[:-1], rotors[1:]), 10.0, rtol=0.1)
-    assert texts[-1] == "continuation in inertia: the task itself"
+    assert set(texts) == {"continuation: more steps from the best motion"}
 
 
 def test_a_plan_without_continuation_is_one_solve(light_hand: Scene, failed: Solution) -> None:
@@ -96,11 +94,11 @@ def test_a_valley_of_positive_curvature_gets_more_steps(arm_scene: Scene) -> Non
     assert stopped.n_neg == 0
     found = plan(arm_scene, HANG, REACH_Q, 1.0, max_iterations=5, **GRID)
     assert found.status is Status.MINIMUM
-    assert "continuation in steps found this minimum in 1 stage and" in found.message
+    assert "continuation found this minimum by" in found.message
     assert found.cost == pytest.approx(plan(arm_scene, HANG, REACH_Q, 1.0, **GRID).cost, rel=1e-9)
 
 
-def test_among_obstacles_a_motion_at_its_iteration_limit_gets_more_steps_first() -> None:
+def test_among_obstacles_a_motion_at_its_iteration_limit_gets_more_steps() -> None:
     robot = hovi.load_robot("ur5")
     start, ball = np.array([0.0, -1.2, 1.2, -0.5, 0.3, 0.1]), hovi.Sphere([0.6, 0.3, 0.4], 0.05)
     reports, few = Reports(), {"max_iterations": 2, "self_collision": False, "starts": 1}
@@ -118,8 +116,8 @@ def test_a_deadline_ends_the_continuation_with_the_best_so_far(
     late = LeapingClock(monkeypatch).leap
     found = swung(light_hand, time_limit=1e5, progress=Reports(late))
     assert (found.success, found.status) == (False, Status.TIME_LIMIT)
-    assert found.cost == failed.cost
-    assert "Continuation in inertia reached the time limit" in found.message
+    assert found.cost == pytest.approx(failed.cost, rel=1e-12)
+    assert "Continuation reached the time limit" in found.message
 
 
 @pytest.mark.parametrize("where", ["within a stage", "between two"])
@@ -135,8 +133,8 @@ def test_an_interrupt_ends_the_continuation_with_the_best_so_far(
 
     found = swung(light_hand, progress=Reports(act))
     assert (found.success, found.status) == (False, Status.INTERRUPTED)
-    assert found.cost == failed.cost
-    assert "was interrupted" in found.message
+    assert found.cost <= failed.cost
+    assert "Continuation was interrupted" in found.message
     assert evaluations.last == 30
     assert evaluations.calls <= 60
 
@@ -153,14 +151,13 @@ def test_an_interrupt_between_two_stages_ends_the_whole_call(light_hand: Scene) 
     assert call()
 
 
-def test_a_continuation_that_fails_names_what_was_tried(light_hand: Scene) -> None:
+def test_a_continuation_that_fails_says_so(light_hand: Scene) -> None:
     failed = swung(light_hand, max_iterations=2, continuation=False)
     found = swung(light_hand, max_iterations=2)
     assert (found.success, found.status) == (False, Status.ITERATION_LIMIT)
     assert found.cost <= failed.cost
     assert found.nit == 2
-    ways = "inertia, the intervals, gravity, the duration, steps"
-    assert f"Continuation in {ways} found no minimum" in found.message
+    assert "Continuation found no minimum" in found.message
 
 
 def test_problems_that_fail_before_any_step_are_not_continued(arm_scene: Scene) -> None:

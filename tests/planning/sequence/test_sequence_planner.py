@@ -433,18 +433,14 @@ def test_several_starts_find_the_same_with_any_number_of_processes() -> None:
     assert one.cost <= planned().cost * 1.01
 
 
-@pytest.mark.parametrize(
-    ("limits", "ways"),
-    [("none", {"steps"}), ({"base": "none", "tau": [60.0, 40.0]}, {"the limits"})],
-)
-def test_easier_problems_of_a_sequence_are_sequences(limits: Any, ways: set[str]) -> None:
-    """Their motions lead to one that meets where segments do, as one that is found at once."""
+@pytest.mark.parametrize("limits", ["none", {"base": "none", "tau": [60.0, 40.0]}])
+def test_a_sequence_that_runs_out_of_steps_goes_on(limits: Any) -> None:
+    """To a motion that meets where segments do, as one that is found at once."""
     said: list[str] = []
     given: dict[str, Any] = {"limits": limits, "intervals": 24, "self_collision": False}
     hurried = {"max_iterations": 3, "progress": lambda text, share: said.append(text)}
     found = hovi.plan_sequence(scene(), [0.0, 0.0], segments(), **given, **hurried)
-    easier = {text.split(":")[0].removeprefix("continuation in ") for text in said if ":" in text}
-    assert ways <= easier
+    assert any(text.startswith("continuation") for text in said)
     assert found.success, found.message
     meets = found.trajectory.sample([0.6, 1.5])
     np.testing.assert_allclose(meets.q, [GRAB, PUT], atol=1e-9)

@@ -17,16 +17,11 @@ from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.problem.tolerance import Accuracy, Round, Tolerance
 from hovi.planning.refinement.candidate import Candidate
 from hovi.planning.refinement.error_estimate import (
-    FinerSolution,
     estimate_against,
     with_estimate,
 )
 from hovi.planning.refinement.hp_refinement import galerkin_with_more_points
-from hovi.planning.refinement.interpolated_outputs import interpolated_slopes
-from hovi.planning.refinement.nearby_minimum import nearby_minimum
-from hovi.planning.refinement.next_grid import MAX_ERROR_OF_DECAY, interpolated_to, next_grid
-from hovi.planning.refinement.spinning import MAX_WORK
-from hovi.planning.solver.action_objective import ActionObjective
+from hovi.planning.refinement.next_grid import interpolated_to, next_grid
 from hovi.planning.solver.central_path import CentralPath
 from hovi.planning.solver.solver import Solution, solve_on_grid
 from hovi.planning.solver.status import Status
@@ -47,8 +42,6 @@ MAX_FIRST_INTERVALS = 60
 """Maximum number of intervals of the first grid."""
 RESTART_ERROR = 0.05
 """Relative error of the first cost above which the refinement begins again with more points."""
-RESTART_ERROR_SPINNING = 0.02
-"""The same for a motion in which a joint spins."""
 MAX_ROUNDS = 14
 """Maximum number of grids."""
 MAX_STALLED_ROUNDS = 2
@@ -162,10 +155,9 @@ class _Search:
         """Run the rounds after the first; returns why they ended early, or ""."""
         if self.restart is not None and _hides(candidate):
             candidate = self.best = self._evaluated(self.restart())
-        stalled = alone = 0
+        stalled = 0
         while not candidate.within_tolerance:
-            alone = alone + 1 if candidate.finer is None else 0
-            reason = self._stop_reason(candidate, stalled, alone)
+            reason = self._stop_reason(candidate, stalled)
             if reason:
                 return reason
             previous, candidate = candidate, self._next(candidate)
@@ -199,7 +191,7 @@ class _Search:
             self.on_round(done)
         return candidate
 
-    def _stop_reason(self, candidate: Candidate, stalled: int, alone: int) -> str:
+    def _stop_reason(self, candidate: Candidate, stalled: int) -> str:
         """Why no finer grid is tried; "" if one is."""
         raise_if_interrupted()
         solution = candidate.solution
@@ -211,12 +203,6 @@ class _Search:
         if candidate.is_at_floor:
             bound = "the tolerance of limits" if solution.problem.limited else "rounding"
             return f"{bound} allows no smaller error"
-        spinning, nearly = candidate.spin, candidate.difference <= MAX_ERROR_OF_DECAY
-        grids = len(self.rounds)
-        if spinning is not None and spinning.is_hopeless(
-            grids=grids, alone=alone, nearly_resolved=nearly
-        ):
-            return f"joint {spinning.joint!r} spins at {spinning.speed:.3g} rad/s"
         if stalled >= MAX_STALLED_ROUNDS:
             return f"the last {MAX_STALLED_ROUNDS} grids did not reduce the error"
         if len(self.rounds) >= MAX_ROUNDS:
@@ -234,33 +220,28 @@ class _Search:
         if finer is None:
             fine, known = problem.on(grid), candidate.solution
             along = _along(known.central, problem, fine)
-            return self._evaluated(self._solved(fine, known.trajectory, candidate, along))
+            return self._evaluated(self._solved(fine, known.trajectory, along))
         if grid is finer.problem.grid:
             solution = finer.finish()
             fine = finer.problem
             previous = None if solution is None else finer.cost_decrease(solution)
         else:
-            fine = problem.on(grid)
-            solution = _solved_nearby(finer, fine)
+            fine, solution = problem.on(grid), None
         if solution is None:
             along = _along(finer.central, finer.problem, fine)
-            solution = self._solved(fine, interpolated_to(finer, fine), candidate, along)
+            solution = self._solved(fine, interpolated_to(finer, fine), along)
         return self._evaluated(solution, previous)
 
     def _solved(
         self,
         problem: TrajectoryProblem,
         guess: Trajectory | DiscretePath,
-        last: Candidate,
         along: CentralPath | None,
     ) -> Solution:
-        """Solve with the remaining time, from the last candidate's motion or a finer one.
+        """Solve with the remaining time, from a motion on another grid.
 
         along: central path of that motion on the grid of the problem; None for none.
         """
-        steps = self.max_iterations
-        if last.spin is not None:
-            steps = min(steps, MAX_WORK // problem.grid.intervals)
         taken, seconds = 0, 0.0
         # A motion would be moved out of its obstacles once more, were it not for `near`. Within
         # limits alone a solve from the guess takes fewer steps, where it ends well.
@@ -269,7 +250,7 @@ class _Search:
             solution = solve_on_grid(
                 problem,
                 Start(guess, along, None if along is None else LEVEL, near),
-                max_iterations=steps,
+                max_iterations=self.max_iterations,
                 time_limit=self.deadline.seconds_left,
                 barrier=self.tolerance.barrier,
             )
@@ -343,15 +324,4 @@ def _along(
 def _hides(candidate: Candidate) -> bool:
     """Whether a motion on few points is not near a finer one, so that its torque may hide."""
     known = candidate.error_of_cost
-    most = RESTART_ERROR if candidate.spin is None else RESTART_ERROR_SPINNING
-    return known is None or known > most
-
-
-def _solved_nearby(finer: FinerSolution, problem: TrajectoryProblem) -> Solution | None:
-    """The minimum on another grid near a finer solution; None if it needs a full solve."""
-    if problem.limited or problem.constrained:
-        return None
-    efforts = interpolated_slopes(finer.problem.ld, finer.path, problem.ld)
-    objective, start = ActionObjective(problem), interpolated_to(finer, problem)
-    found = nearby_minimum(objective, start, objective.model_with(start, efforts, None))
-    return None if found is None else found.solution()
+    return known is None or known > RESTART_ERROR

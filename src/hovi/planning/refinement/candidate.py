@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-from functools import cached_property
 from typing import Self
 
 import numpy as np
@@ -26,7 +25,6 @@ from hovi.planning.refinement.passive_torque import (
     PassiveTorque,
     passive_torque,
 )
-from hovi.planning.refinement.spinning import Spin, spin_without_limits
 from hovi.planning.solver.limits.limit_rows import MAX_LOSS
 from hovi.planning.solver.outcome.cost_with_time import price_of_time
 from hovi.planning.solver.solver import Solution
@@ -144,11 +142,6 @@ class Candidate:
         """
         known = self.error_of_cost
         return np.inf if known is None else max(known, self.along)
-
-    @cached_property
-    def spin(self) -> Spin | None:
-        """The joint that spins; None if none does, and for limited problems."""
-        return None if self.solution.problem is None else spin_without_limits(self.solution)
 
     @property
     def larger_error(self) -> float:

@@ -20,10 +20,6 @@ TARGET_FRACTION = 0.3
 """Error for which a grid is refined, as a fraction of the tolerance."""
 MAX_ERROR_OF_DECAY = 1e-2
 """Relative error of the cost up to which the decay of the modes is that of the motion."""
-MAX_ERROR_WITH_FEW_POINTS = 0.05
-"""Relative error of the cost up to which the next grid has r + 2 points per interval, which are
-cheaper; with larger errors the torque could hide between them. Within limits, and where a joint
-spins, only up to CURVE_TOLERANCE."""
 FINER_GRID_RATIO = 2.5
 """Ratio of the finer solution's predicted error to that target up to which its grid is the next:
 the solution is known already, and estimating its error is cheap."""
@@ -39,8 +35,7 @@ def next_grid(candidate: Candidate) -> Grid:
     rho = _decay(candidate, finer)
     error = np.inf if candidate.error_of_cost is None else candidate.error_of_cost
     decay_known = error <= MAX_ERROR_OF_DECAY
-    may_hide = problem.limited or candidate.spin is not None
-    few_points = error <= (CURVE_TOLERANCE if may_hide else MAX_ERROR_WITH_FEW_POINTS)
+    few_points = error <= CURVE_TOLERANCE  # with larger errors torques could hide between them
     same_steps = np.array_equal(problem.grid.steps, finer.problem.grid.steps)
     # with all intervals halved, as under limits, its own estimate would need twice as many again
     usable = same_steps and (decay_known or finer.problem.grid.inner_modes <= UNRESOLVED_MODES)

@@ -26,7 +26,6 @@ from hovi.planning.refinement.error_estimate import (
     finer_than,
     prolonged,
     with_estimate,
-    with_metadata,
 )
 from hovi.planning.refinement.faults.narrow_features import with_features
 from hovi.planning.refinement.faults.on_curve import (
@@ -38,12 +37,7 @@ from hovi.planning.refinement.faults.on_curve import (
 )
 from hovi.planning.refinement.faults.remedy import remedy
 from hovi.planning.refinement.limit_sensitivity import cost_of_tolerance, limit_prices
-from hovi.planning.refinement.spinning import (
-    fault_of_distance,
-    fault_of_spinning,
-    spin,
-    spin_without_minimum,
-)
+from hovi.planning.refinement.spinning import fault_of_valley, spin
 from hovi.planning.solver.methods.method import Method, Report
 from hovi.planning.solver.methods.stationary import Stationary
 from hovi.planning.solver.outcome.cost_with_time import cost_of
@@ -142,13 +136,10 @@ def resolved(solution: Solution) -> Solution:
         most 1 %. The finer grid has two more modes per interval, of a Galerkin table for any
         scheme; under limits every interval is halved where that fails;
     (c) that solution was found;
-    (d) no light joint without limits spins too fast for the error of the cost; if one spins
-        fast, the finer solution has a minimum nearby on a still finer grid: see
-        `fault_of_spinning`;
-    (e) without limits, the finer solution is near, or a still finer one is much closer to it: see
-        `fault_of_distance`;
-    (f) no effect has features between the points that change the cost by more: see `features_of`;
-    (g) it is usable: see `judged`.
+    (d) where without limits a light joint spins, or the finer solution is far away, a still finer
+        grid confirms the finer one: see `fault_of_valley`;
+    (e) no effect has features between the points that change the cost by more: see `features_of`;
+    (f) it is usable: see `judged`.
     Solutions of another status are returned unchanged. If the deadline in force passes before
     all of this is known, the status is TIME_LIMIT, and INTERRUPTED after Ctrl-C.
     """
@@ -181,24 +172,10 @@ def _checked(solution: Solution) -> tuple[Solution, str]:
     elif not reason and not costs_nothing(solution):
         reason = _fault_of_estimate(solution)
     error = None if costs_nothing(solution) else solution.error_estimate
-    for fault_of in (fault_of_spinning, fault_of_distance):
-        reason = reason or fault_of(solution, error, finer)
+    reason = reason or fault_of_valley(solution, error, finer)
     if not reason:
         solution, reason = with_features(solution)
     return solution, reason
-
-
-def unresolved_if_spinning(solution: Solution) -> Solution:
-    """A motion at its iteration limit, with the status UNRESOLVED if a light joint spins in it."""
-    spinning = spin_without_minimum(solution)
-    if spinning is None:
-        return solution
-    return dataclasses.replace(
-        solution,
-        status=Status.UNRESOLVED,
-        message=f"{solution.message.rstrip('.')}: {spinning}.",
-        trajectory=with_metadata(solution.trajectory, status=str(Status.UNRESOLVED)),
-    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -244,7 +221,7 @@ class Resolution(MotionCheck):
         return FARTHER if calm else NEARBY
 
     def __call__(self, solution: Solution) -> Solution:
-        """The solution as `resolved` returns it; near the resolved one with (a) and (f) at most."""
+        """The solution as `resolved` returns it; near the resolved one with (a) and (e) at most."""
         try:
             solution = judged(solution)
         except OutOfTimeError:

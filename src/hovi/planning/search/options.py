@@ -212,8 +212,8 @@ class PlanOptions:
     )
     continuation: bool = option(
         True,
-        "if no start ends in a minimum, solve easier problems that lead to this one, in inertia, "
-        "gravity, duration, intervals or limits; the message names the one that succeeded.",
+        "if no start ends in a minimum and one ran out of iterations, go on from its motion; the "
+        "message says so.",
         SceneKey("true or false"),
     )
 

@@ -18,8 +18,7 @@ from hovi.planning.problem.presolve.ramps import graded_to_ramps
 from hovi.planning.refinement.error_estimate import with_metadata
 from hovi.planning.refinement.faults.narrow_features import NARROW
 from hovi.planning.refinement.hp_refinement import galerkin_with_more_points
-from hovi.planning.refinement.resolution import Resolution, resolved, unresolved_if_spinning
-from hovi.planning.refinement.spinning import spin_without_minimum
+from hovi.planning.refinement.resolution import Resolution, resolved
 from hovi.planning.search.branch_choice import Ends
 from hovi.planning.search.continuation import STOPPED, UNUSABLE, may_help, solve_by_continuation
 from hovi.planning.search.final_stages import (
@@ -229,8 +228,7 @@ class Search:
                 return [_noting_cheaper(checked), *found[i + 1 :]]
             if self.deadline.passed or interrupted():
                 break
-        best = self._seeing_features(found[0], checked[0])
-        return [best if self.fine.tolerance is None else unresolved_if_spinning(best)]
+        return [self._seeing_features(found[0], checked[0])]
 
     def _at_finer_tolerances(self, solution: Solution, refused: Solution) -> Solution:
         """A minimum that is unresolved at its tolerance, refined to finer ones until it is not.
@@ -330,11 +328,7 @@ class Search:
             return found
         if not may_help(found[0]):
             return found
-        if self.fine.tolerance is not None:
-            known = dataclasses.replace(found[0], problem=on_grid_of(job.problem(), found[0]))
-            if spin_without_minimum(known) is not None:  # no easier problem leads to an answer
-                return found
-        return [solve_by_continuation(job, found[0], options.guess, self.deadline, self.progress)]
+        return [solve_by_continuation(job, found[0], self.deadline, self.progress)]
 
     def _stages(self, job: Job, found: list[Solution]) -> Iterator[list[Solution]]:
         """The minima after each stage: continuation, refinement, best duration.

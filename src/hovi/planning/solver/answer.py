@@ -44,8 +44,6 @@ class Answer:
     jets: (q, v, a) of the path at the quadrature points, if they were computed.
     model: the quadratic model of the last step of a solve without bounds or equations.
     central: the path of a barrier method towards the motion, for warm starts.
-    locally_infeasible: whether the violation of limits has minima that are not zero from several
-        guesses.
     """
 
     problem: TrajectoryProblem
@@ -61,7 +59,6 @@ class Answer:
     jets: list[Jet] | None = None
     model: QuadraticModel | None = None
     central: CentralPath | None = None
-    locally_infeasible: bool = False
 
     @classmethod
     def at(

@@ -98,7 +98,6 @@ class Solution(SolutionSummary):
         limits at instants between them. instants: these; None for none.
     central, model: what `replan` starts from, the path of a barrier method or the last model.
     check: returns a replanned motion with its error estimate or as UNRESOLVED; None for no check.
-    locally_infeasible: whether the violation of limits has nonzero minima from several guesses.
     """
 
     success: bool
@@ -120,7 +119,6 @@ class Solution(SolutionSummary):
     central: CentralPath | None = field(default=None, repr=False)
     model: QuadraticModel | None = field(default=None, repr=False)
     check: Check | None = field(default=None, repr=False)
-    locally_infeasible: bool = field(default=False, repr=False)
 
     @cached_property
     def effort(self) -> float | None:
@@ -424,7 +422,6 @@ def solution_of(result: Answer, setup_seconds: float = 0.0, solve_seconds: float
         instants=result.instants,
         central=result.central,
         model=result.model,
-        locally_infeasible=result.locally_infeasible,
     )
 
 

@@ -80,7 +80,7 @@ class TimedSearch(BoundedSearch):
         known, criteria = self.known_multipliers(start.x), self.remaining_criteria()
         first = self.objective(known, "band", EXACT_TOLERANCES)
         objective = TimedBoundedAction(first, self.price, self.lengths)
-        criteria = dataclasses.replace(criteria, decrease=LAST_DECREASE, plain=False)
+        criteria = dataclasses.replace(criteria, decrease=LAST_DECREASE)
         x = TimedPath(start.x, self.lengths)
         found = minimize_bounded(objective, Start(x, start.z), criteria, self.report)
         self.iterations += len(found.steps)

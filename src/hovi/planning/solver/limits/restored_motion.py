@@ -71,7 +71,6 @@ def locally_infeasible(search: BoundedSearch, ended: Bounded) -> str:
             ended.x = min(same, key=penalized.action)
             ended.outputs = objective.outputs(ended.x)
             ended.z = Barrier.inactive(objective.bounds, ended.outputs.y)
-            search.locally_infeasible = True
             return search.worst(ended.x)
     search.rows = rows
     return ""

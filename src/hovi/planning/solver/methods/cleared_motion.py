@@ -3,32 +3,24 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
 
 import numpy as np
 
 from hovi.discrete.grid import DiscretePath
 from hovi.optimize.ended import STOPPED, Reason
 from hovi.optimize.start import Start
-from hovi.planning.problem.limits import no_limits
 from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.augmented_lagrangian_rounds import (
     first_multipliers,
     minimize_constrained,
 )
-from hovi.planning.solver.central_path import CentralPath
-from hovi.planning.solver.limits.limit_rows import LimitRows
 from hovi.planning.solver.methods.bounded_search import (
     ROUGH_TOLERANCES,
     Bounded,
     BoundedSearch,
 )
-from hovi.planning.solver.methods.method import Guess
-from hovi.planning.solver.methods.subproblems import Subproblem, joined, subproblems_of
 from hovi.planning.solver.multipliers import Multipliers
-from hovi.planning.solver.near.clearance_rows import ClearanceRows
 from hovi.planning.solver.near.push_out import pushed_out
-from hovi.system.dataclass import dataclass
 from hovi.system.deadline import raise_if_late
 
 AHEAD = 0.06
@@ -39,95 +31,29 @@ FIRST_MU = 0.1
 """First barrier parameter from a motion that was moved, relative to the cost's mean density."""
 ROUGH_STEPS = 100
 """Maximum number of its steps."""
-SECOND_STEPS, LEAST_SECOND_STEPS = 3, 20
-"""The same for a second rough motion: per step of the first one, and at least."""
 ROUGH_VIOLATION = 0.05
 """Largest violation of a bound, relative to its range, from which a rough motion is solved on."""
 ROUGH_ROUNDS = 3
 """Rounds of an augmented Lagrangian for a rough motion."""
-SUBPROBLEM_LEVEL = 3e-4
-"""Barrier parameter at which the subproblems of a motion are joined, relative to the cost's mean
-density: small enough that each stays where it is, and large enough for the accelerations at the
-seams."""
-SUBPROBLEM_AHEAD = 0.005
-"""Distance beyond the least one up to which pairs get rows then, in [m]."""
-DETOUR = 1.05
-"""Cost of a rough motion, relative to that of one without distances, above which it is one."""
 
 
 def cleared_motion(search: BoundedSearch, guess: DiscretePath) -> Bounded:
     """A motion within limits that keeps its distances, from a guess that may keep neither.
 
-    It is solved without distances, until it can be seen whether it keeps them. If it does not, a
-    motion with seams is solved in subproblems, and then as a whole. Without them, or where that
-    fails, it is moved out of the obstacles, and so is the guess if that takes a detour. The better
-    rough motion, by bounds and then by cost, is solved to its end.
+    It is solved without distances, until it can be seen whether it keeps them. If it does not, it
+    is moved out of the obstacles, or the guess is where that fails; a rough motion from there is
+    solved to its end.
     """
     assert search.near is not None
     free = _without_distances(search, guess)
     if not search.near.blocked and free.why is not Reason.DIVERGED:
         return free
-    by_subproblems = _by_subproblems(search, guess)
-    if by_subproblems is not None:
-        return by_subproblems
-    rough = [_rough_with_distances(search, free.x)]
-    if rough[0] is None or rough[0].rank > (False, DETOUR * abs(free.outputs.value)):
-        steps = ROUGH_STEPS
-        if rough[0] is not None:
-            steps = max(SECOND_STEPS * len(rough[0].ended.steps), LEAST_SECOND_STEPS)
-        rough.append(_rough_with_distances(search, guess, min(steps, ROUGH_STEPS)))
-    best = min(filter(None, rough), key=lambda each: each.rank, default=None)
-    if best is not None:
-        return best.solved(search)
+    for path in (free.x, guess):
+        found = _moved_out(search, path)
+        if found is not None:
+            return found
     raise_if_late()  # or more time might lead to one
     return dataclasses.replace(free, why=Reason.DIVERGED)
-
-
-def _by_subproblems(search: BoundedSearch, guess: DiscretePath) -> Bounded | None:
-    """The solution from those of the subproblems; None without them, or where that fails."""
-    subproblems = subproblems_of(search.problem)
-    parts = list[BoundedSearch]()
-    known = list[CentralPath]()
-    for subproblem in subproblems:
-        part = _search_of(subproblem, search, guess)
-        ended = cleared_motion(part, part.guess)
-        search.iterations += part.iterations
-        search.history += part.history
-        if not ended.converged:
-            return None
-        parts.append(part)
-        known.append(part.central_path(ended))
-    if not subproblems:
-        return None
-    path = joined(subproblems, [each.at(SUBPROBLEM_LEVEL)[1] for each in known])
-    ended = _from_subproblems(search, subproblems, parts, path)
-    return ended if ended.settled else None
-
-
-def _search_of(subproblem: Subproblem, search: BoundedSearch, guess: DiscretePath) -> BoundedSearch:
-    """The search of a subproblem. guess: of the whole motion."""
-    problem, criteria = subproblem.problem, search.remaining_criteria()
-    start: Guess = Start(subproblem.path(guess))
-    limits = problem.limits or no_limits(problem.coordinates)
-    return BoundedSearch(problem, limits, criteria, search.report, start, lazy=True)
-
-
-def _from_subproblems(
-    search: BoundedSearch,
-    subproblems: Sequence[Subproblem],
-    parts: Sequence[BoundedSearch],
-    path: DiscretePath,
-) -> Bounded:
-    """The solve of the whole from the joined path, with the subproblems' distances."""
-    near = [
-        (subproblem.first, each.near)
-        for subproblem, each in zip(subproblems, parts, strict=True)
-        if each.near
-    ]
-    search.rows, search.near = search.coarse_rows(), search.no_near_rows()
-    search.near.take(near)
-    search.near.extend(search.problem, path, SUBPROBLEM_AHEAD)
-    return search.solve_at_level(path, SUBPROBLEM_LEVEL)
 
 
 def _without_distances(search: BoundedSearch, guess: DiscretePath) -> Bounded:
@@ -157,38 +83,10 @@ def _rough_with_constraints(search: BoundedSearch, guess: DiscretePath) -> Bound
     return minimize_constrained(problem, guess, minimize_round, most=ROUGH_ROUNDS)[0]
 
 
-@dataclass(frozen=True, eq=False)
-class _Rough:
-    """A rough motion with distances, its rows, and multipliers of constraints, if there are any."""
+def _moved_out(search: BoundedSearch, path: DiscretePath) -> Bounded | None:
+    """The solution from a path that is moved out of obstacles; None where that leads nowhere.
 
-    ended: Bounded
-    multipliers: Multipliers | None
-    rows: LimitRows
-    near: ClearanceRows
-
-    @property
-    def rank(self) -> tuple[bool, float]:
-        """Whether it does not keep its bounds yet, and the action."""
-        return not self.ended.feasible, self.ended.outputs.value
-
-    def solved(self, search: BoundedSearch) -> Bounded:
-        """The solve from there to the end, with rows of pairs that are near."""
-        x, barrier = self.ended.x, self.ended.z
-        near, kept = self.near.thinned(x, KEPT)
-        points = len(barrier.s) - len(self.near.order)
-        search.rows, search.near = self.rows, near
-        search.multipliers = self.multipliers
-        if self.ended.why in STOPPED:
-            return search.solve(Start(x))
-        return search.solve(Start(x, barrier.of(np.append(np.arange(points), points + kept))))
-
-
-def _rough_with_distances(
-    search: BoundedSearch, path: DiscretePath, most: int = ROUGH_STEPS
-) -> _Rough | None:
-    """A rough motion near a path that is moved out of obstacles; None if there is none.
-
-    most: maximum number of steps.
+    A rough motion from there shows which pairs stay near: these alone keep their rows.
     """
     problem, distances = search.problem, search.problem.distances
     assert distances is not None
@@ -197,16 +95,20 @@ def _rough_with_distances(
     if moved is None:
         return None
     search.near.extend(problem, moved, AHEAD)
-    search.near.watchful = True
     known = first_multipliers(problem, moved) if problem.constrained else None
-    ended, known = _rough(search, moved, known, FIRST_MU, most)
-    violation = ended.violation
-    if ended.why is Reason.DIVERGED or violation > ROUGH_VIOLATION:
+    rough, known = _rough(search, moved, known, FIRST_MU)
+    x, barrier = rough.x, rough.z
+    if rough.why is Reason.DIVERGED or rough.violation > ROUGH_VIOLATION:
         return None
     if known is not None and len(problem.passive) > 0:
-        residuals = ActionObjective(problem, multipliers=known).residuals(ended.x)
+        residuals = ActionObjective(problem, multipliers=known).residuals(x)
         known = known.updated(residuals, problem.passive)
-    return _Rough(ended, known, search.rows, search.near)
+    search.multipliers = known
+    points = len(barrier.s) - len(search.near.order)
+    search.near, kept = search.near.thinned(x, KEPT)
+    if rough.why in STOPPED:
+        return search.solve(Start(x))
+    return search.solve(Start(x, barrier.of(np.append(np.arange(points), points + kept))))
 
 
 def _rough(
@@ -214,15 +116,15 @@ def _rough(
     path: DiscretePath,
     known: Multipliers | None,
     mu: float | None,
-    most: int = ROUGH_STEPS,
 ) -> tuple[Bounded, Multipliers | None]:
     """A solve up to a large barrier parameter, and the multipliers of conditions then.
 
     known: multipliers of constraints. mu: the first such parameter, None for a start at the guess.
-    most: maximum number of steps.
     """
     criteria = search.remaining_criteria().rough()
-    criteria = dataclasses.replace(criteria, max_iterations=min(most, criteria.max_iterations))
+    criteria = dataclasses.replace(
+        criteria, max_iterations=min(ROUGH_STEPS, criteria.max_iterations)
+    )
     tolerances = ROUGH_TOLERANCES if len(search.problem.passive) == 0 else None
     objective = search.objective(known, tolerances=tolerances)
     start = Start(path) if mu is None else search.start_at(path, mu, objective)

@@ -46,10 +46,6 @@ def feasible_motion(search: BoundedSearch) -> tuple[Bounded, str]:
         reason = locally_infeasible(search, ended)
         if reason or ended.why in STOPPED:
             return ended, reason
-    if ended.why is Reason.DIVERGED and ended.corrected:
-        search.criteria = dataclasses.replace(search.criteria, plain=True)
-        search.rows = search.fine_rows()
-        ended = search.solve(Start(search.guess))
     if ended.feasible or ended.why is not Reason.DIVERGED:
         return ended, ""
     return restored_motion(search, ended)
@@ -67,14 +63,7 @@ def _solved_nearby(search: BoundedSearch) -> Bounded | None:
     search.criteria = dataclasses.replace(whole, max_iterations=most)
     ended = solved_from(search, search.guess) if along is None else _solved_along(search, along)
     search.criteria = whole
-    left = whole.max_iterations - len(ended.steps)
-    closer = ended.feasible and ended.why is Reason.ITERATION_LIMIT  # than a guess
-    if not closer or left <= 0:
-        return ended if ended.settled else None
-    search.criteria = dataclasses.replace(whole, max_iterations=left)
-    ended = search.solve(Start(ended.x, ended.z))
-    search.criteria = whole
-    return None if ended.why is Reason.DIVERGED else ended
+    return ended if ended.settled else None
 
 
 def _solved_at_all(search: BoundedSearch) -> Bounded:
@@ -165,12 +154,10 @@ def _solved_warm(search: BoundedSearch, known: Barrier, path: DiscretePath) -> B
 
 def _solved_from_level(search: BoundedSearch, along: CentralPath, level: float) -> Bounded:
     """Solve from the point of a central path with a barrier as large as a level."""
-    problem, other_ends = search.problem, search.near is not None and search.level is None
-    fraction, point = along.close(level, problem.coordinates) if other_ends else along.at(level)
-    path = problem.moved(point)
+    fraction, point = along.at(level)
+    path = search.problem.moved(point)
     if along.rows is None:
         search.rows.refine(path, fraction)
-    search.look_around(path)
     return search.solve_at_level(path, fraction)
 
 
@@ -180,6 +167,5 @@ def solved_from(search: BoundedSearch, path: DiscretePath) -> Bounded:
     Parts are halved first, as far as this barrier asks for: the motion may exceed coarser control
     points.
     """
-    search.look_around(path)
     search.rows.refine(path, NEARBY_MU)
     return search.solve(search.start_at(path, NEARBY_MU, search.objective(search.multipliers)))

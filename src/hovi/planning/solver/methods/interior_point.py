@@ -19,7 +19,6 @@ from hovi.planning.solver.methods.bounded_search import BoundedSearch
 from hovi.planning.solver.methods.feasibility import feasible_motion
 from hovi.planning.solver.methods.limits_between_points import tightened, usable
 from hovi.planning.solver.methods.method import Guess, Method, Report
-from hovi.planning.solver.methods.torque_rates_last import with_torque_rates_last
 from hovi.planning.solver.non_finite import non_finite_condition, non_finite_sentence
 from hovi.planning.solver.outcome.cost_with_time import cost_of
 from hovi.planning.solver.status import (
@@ -59,18 +58,10 @@ class InteriorPoint(Method):
         criteria: Criteria,
         report: Report | None = None,
     ) -> Answer:
-        """See Method.minimize; intervals may be split."""
-        solve = partial(self._solved, report=report)
-        return with_torque_rates_last(solve, problem, start, criteria)
+        """See Method.minimize; intervals may be split.
 
-    def _solved(
-        self,
-        problem: TrajectoryProblem,
-        start: Guess,
-        criteria: Criteria,
-        report: Report | None,
-    ) -> Answer:
-        """With rows for distances where pairs come near; in rounds where that is not supported."""
+        With rows for distances where pairs come near; in rounds where that is not supported.
+        """
         if takes_rows(problem):
             return self._minimize(problem, start, criteria, report, lazy=True)
         solve = partial(self._minimize, report=report)
@@ -121,9 +112,8 @@ def _searched(search: BoundedSearch) -> Answer:
     history, central = search.history, None
     if status is Status.MINIMUM:
         central = search.central_path(ended)
-    result = Answer(problem, x, value, status, message, nit, n_neg, history, forces, instants)
-    locally = status is Status.INFEASIBLE and search.locally_infeasible
-    return dataclasses.replace(result, central=central, locally_infeasible=locally)
+    found = Answer(problem, x, value, status, message, nit, n_neg, history, forces, instants)
+    return dataclasses.replace(found, central=central)
 
 
 def _ended(search: BoundedSearch, why: Reason) -> Answer:

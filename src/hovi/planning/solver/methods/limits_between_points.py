@@ -35,10 +35,6 @@ WARM_EXCESS = 0.2
 that exceeds limits further between the points is an artifact of the coarse grid."""
 TIGHTENING_FACTOR = 1.5
 """Ratio of tightening and excess; above 1, since the next motion uses the range that is left."""
-MAX_TIGHTENING_FACTOR = 8.0
-"""The same where the last tightening reduced the excess by little."""
-SECANT_FACTOR = 1.2
-"""Ratio of tightening and what the secant of the last one asks for."""
 EXTRA_TIGHTENING = 5.0
 """Additional tightening, in tolerances, to end the rounds early."""
 UNUSED_MARGIN = 1e-3
@@ -97,11 +93,10 @@ def _goes_on(search: BoundedSearch, ended: Bounded) -> bool:
 
 def _solved_tighter(search: BoundedSearch, ended: Bounded, sides: Array) -> Bounded:
     """Solve again with the bounds tightened in proportion to the excess of the interpolant."""
-    factors = _tightening_factors(search, sides)
-    tighter = np.where(sides > 0, factors * sides + EXTRA_TIGHTENING * search.limits.tolerance, 0.0)
+    extra = EXTRA_TIGHTENING * search.limits.tolerance
+    tighter = np.where(sides > 0, TIGHTENING_FACTOR * sides + extra, 0.0)
     unused = np.isfinite(sides) & (sides < -UNUSED_MARGIN)
     looser = np.where(unused, sides + 0.5 * UNUSED_MARGIN, 0.0)
-    search.tightened = search.margins, sides
     search.margins = np.clip(search.margins + tighter + looser, 0.0, MAX_MARGIN)
     objective = search.objective(search.multipliers)
     fraction = float(np.clip(1e-2 * float(sides.max()), *WARM_MU_RANGE))
@@ -117,19 +112,6 @@ def _solved_tighter(search: BoundedSearch, ended: Bounded, sides: Array) -> Boun
     ended = search.solve(Start(ended.x, z))
     search.criteria = whole
     return ended
-
-
-def _tightening_factors(search: BoundedSearch, sides: Array) -> Array:
-    """Ratio of tightening and excess of each bound, by the secant of the last tightening."""
-    if search.tightened is None:
-        return np.full(sides.shape, TIGHTENING_FACTOR)
-    margins, before = search.tightened
-    change = search.margins - margins
-    tightened = (change > 0) & (before > 0) & (sides > 0)
-    reduced = np.subtract(before, sides, where=tightened, out=np.ones_like(sides))
-    rate = np.maximum(reduced, 0.0) / np.where(tightened, change, 1.0)
-    slowest = SECANT_FACTOR / MAX_TIGHTENING_FACTOR
-    return np.maximum(SECANT_FACTOR / np.maximum(rate, slowest), TIGHTENING_FACTOR)
 
 
 def _solved_on_halves(search: BoundedSearch, ended: Bounded, sides: Array) -> tuple[Bounded, str]:
@@ -151,7 +133,7 @@ def _solved_on_halves(search: BoundedSearch, ended: Bounded, sides: Array) -> tu
     search.problem = search.problem.on(grid.halved(chosen))
     search.guess = search.problem.path(guess)
     search.multipliers, search.along = None, None
-    search.margins, search.tightened = search.no_margins(), None
+    search.margins = search.no_margins()
     search.rows = search.coarse_rows()
     if search.near is not None:
         search.near = search.no_near_rows()

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import copy
 import dataclasses
-from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -40,17 +39,12 @@ Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]
 Mask = npt.NDArray[np.bool_]
 
-ROUNDED_FRACTION, LEAST_ROUNDING, MOST_ROUNDING = 0.1, 2e-5, 1e-3
-"""Size by which the shapes of a row are rounded, as a fraction of what the row is above its bound,
-and the least and the largest, in [m]: see Distances.values."""
-SHARPENED = 0.5
-"""Ratio of such a size to the present one below which it takes its place."""
+ROUNDING = 2e-5
+"""Size by which the shapes of rows are rounded, in [m]: see Distances.values."""
 MOST_INFLATION = 10.0
-"""Bound of what a rounded distance is shorter by, relative to the size."""
+"""Bound of what a rounded distance is shorter by, relative to that size."""
 WEIGHT = 0.1
 """Weight of a row in a barrier, as a fraction of the interval."""
-NEARBY = 0.3
-"""Distance up to which a row is near a new one, relative to the interval."""
 GUARD = 0.05
 """Distance beyond the least one below which pairs get rows at once, in [m]."""
 
@@ -61,26 +55,24 @@ class ClearanceRows:
     They are as `ClearanceOutputs` measures them. None at first; `extend` adds some.
 
     problem: with the grid and the ends. distances: of all pairs. least: lower bound, in [m].
-    intervals, positions, pairs, rounding: of each row, shape (E,): its interval, where it is in it,
-        from 0 to 1, the number of its pair, and the size by which its shapes are rounded, in [m].
-    transfer: see Refinement; numbers among these rows. order: see `stand_behind`.
+    intervals, positions, pairs: of each row, shape (E,): its interval, where it is in it, from 0 to
+        1, and the number of its pair.
+    order: see `stand_behind`.
     fixed: whether rows stay as they are. guard: distance beyond the least one below which `follow`
-        adds rows, in [m]. probing, blocked: see `extend`. watchful: whether pairs are followed even
-        before there are any rows.
+        adds rows, in [m]. probing, blocked: see `extend`.
     """
 
     def __init__(self, problem: TrajectoryProblem, distances: Distances, least: float) -> None:
         self.distances, self.least = distances, least
         self.fixed, self.guard = False, GUARD
-        self.transfer: tuple[Index, Index] | None = None
-        self.probing = self.blocked = self.watchful = False
+        self.probing = self.blocked = False
         self.order: Index = np.zeros(0, dtype=np.intp)
         self._followed: LimitRows | None = None
         self._problem, self._spread = problem, RecentPaths[Array]()
         self.grid, self._spread_batch = problem.grid, spread(problem, SPREAD)
         self._measured, self._normals = RecentPaths[Array](), np.zeros((0, 3))
         none = np.zeros(0, dtype=np.intp)
-        self._set(problem, none, np.zeros(0), none, np.zeros(0))
+        self._set(problem, none, np.zeros(0), none)
 
     def copied(self, fixed: bool = False) -> ClearanceRows:
         """The same rows, to be extended on their own, or not at all."""
@@ -95,7 +87,7 @@ class ClearanceRows:
         """
         rows = copy.copy(self)
         rows._followed = behind
-        rows._set(problem, self.intervals, self.positions, self.pairs, self.rounding)
+        rows._set(problem, self.intervals, self.positions, self.pairs)
         rows._normals = self._normals.copy()
         return rows
 
@@ -136,7 +128,7 @@ class ClearanceRows:
         place = (np.cumsum(used) - 1)[instant]
         wanted = np.zeros((int(place.max()) + 1, self._wanted.shape[1]), dtype=bool)
         wanted[place, column] = True
-        q, sizes = self._configurations(path, times)[used], self._sizes[used]
+        q, sizes = self._configurations(path, times)[used], np.full(wanted.shape, ROUNDING)
         normals = np.zeros((*wanted.shape, 3))
         normals[place, column] = self._normals[chosen]
         d = self._some.values(q, self._reach, wanted, sizes, normals)
@@ -153,7 +145,7 @@ class ClearanceRows:
         weights[self._instant, self._column] = force * slope / DISTANCE_SCALE
         normals = np.zeros((*weights.shape, 3))
         normals[self._instant, self._column] = self._normals
-        given = self._reach, self._wanted, self._sizes, normals
+        given = self._reach, self._wanted, np.full(weights.shape, ROUNDING), normals
         found = self._some.expansion(q, weights, *given)
         self._normals[:] = normals[self._instant, self._column]
         J = found[1][self._instant, self._column] / DISTANCE_SCALE
@@ -212,19 +204,6 @@ class ClearanceRows:
         self.probing = False
         return self._add(problem, path, found)
 
-    def sharpen(self, path: DiscretePath) -> bool:
-        """Round shapes less in rows that have come nearer to their bounds; whether there are any.
-
-        Their outputs grow by that. Rounder shapes bend the motion less where it is far, so that
-        steps may be longer; at a bound they are nearly as they are.
-        """
-        size = _rounding_of(self.values(path))
-        sharper = size < SHARPENED * self.rounding
-        if not sharper.any():
-            return False
-        self._round(np.where(sharper, size, self.rounding))
-        return True
-
     def thinned(self, path: DiscretePath, within: float) -> tuple[ClearanceRows, Index]:
         """The rows of pairs that are near along a motion alone; others get rows later from now on.
 
@@ -234,7 +213,7 @@ class ClearanceRows:
         kept = self.values(path) <= within / DISTANCE_SCALE
         rows = copy.copy(self)
         rows._followed, rows.guard, rows._spread = None, 0.5 * within, RecentPaths()
-        some = self.intervals[kept], self.positions[kept], self.pairs[kept], self.rounding[kept]
+        some = self.intervals[kept], self.positions[kept], self.pairs[kept]
         rows._set(self._problem, *some)
         rows._normals = self._normals[kept]
         limits = len(self.order) - self.size
@@ -270,12 +249,6 @@ class ClearanceRows:
             self._spread = self._spread.with_entry(path, d)
         return d
 
-    def take(self, parts: Sequence[tuple[int, ClearanceRows]]) -> None:
-        """Take the rows of parts of the motion: the number of their first interval, and rows."""
-        chosen = [(x.intervals + first, x.positions, x.pairs, x.rounding) for first, x in parts]
-        if chosen:
-            self._set(self._problem, *(np.concatenate(each) for each in zip(*chosen, strict=True)))
-
     def _add(self, problem: TrajectoryProblem, path: DiscretePath, found: Approaches) -> int:
         """Add rows at approaches of a path at which there are none yet."""
         found = found.other_than(self.intervals + self.positions, self.pairs)
@@ -285,33 +258,13 @@ class ClearanceRows:
         both = (self.intervals, k), (self.positions, found.at - k), (self.pairs, found.pairs)
         intervals, positions, pairs = (np.concatenate(each) for each in both)
         added = len(found.pairs)
-        self.transfer = self._nearby(found)
-        rounding = np.append(self.rounding, np.full(added, LEAST_ROUNDING))
         before = self._measured if problem is self._problem else RecentPaths[Array]()
         normals = np.concatenate([self._normals, np.zeros((added, 3))])
-        self._set(problem, intervals, positions, pairs, rounding)
+        self._set(problem, intervals, positions, pairs)
         self._measured = before.mapped(lambda known: np.append(known, np.full(added, np.nan)))
         self._normals = normals
-        rounding = rounding.copy()
-        rounding[-added:] = _rounding_of(self.values(path)[-added:])
-        self._round(rounding)
         self.order = np.append(self.order, len(self.order) + np.arange(added))
         return added
-
-    def _nearby(self, found: Approaches) -> tuple[Index, Index]:
-        """Numbers of new rows at approaches, and of the rows near them of the same pairs.
-
-        Each of these belongs to the nearest new row, at most NEARBY of an interval away.
-        """
-        own = self.intervals + self.positions
-        new, old = [np.zeros(0, dtype=np.intp)], [np.zeros(0, dtype=np.intp)]
-        for pair in np.intersect1d(found.pairs, self.pairs):
-            here, there = np.flatnonzero(found.pairs == pair), np.flatnonzero(self.pairs == pair)
-            apart = np.abs(found.at[here][:, None] - own[there])
-            near = apart.min(axis=0) <= NEARBY
-            new.append(self.size + here[apart.argmin(axis=0)[near]])
-            old.append(there[near])
-        return np.concatenate(new), np.concatenate(old)
 
     def _set(
         self,
@@ -319,9 +272,8 @@ class ClearanceRows:
         intervals: Index,
         positions: Array,
         pairs: Index,
-        rounding: Array,
     ) -> None:
-        """Take rows: their intervals, positions in these, numbers of pairs, and rounding, (E,)."""
+        """Take rows: their intervals, positions in these, and numbers of pairs, (E,)."""
         if problem is not self._problem:
             self._spread = RecentPaths()
         if problem.grid is not self.grid:
@@ -335,24 +287,12 @@ class ClearanceRows:
         self._some = self.distances.restricted(chosen.tolist())
         self._wanted = np.zeros((len(at), len(chosen)), dtype=bool)
         self._wanted[self._instant, self._column] = True
-        self._take_rounding(rounding)
         self._sums = RowSums.of(at.real.astype(np.intp), self._instant)
         number = problem.grid.intervals * SPREAD + 1
         self._watched = np.tile(free_ones(problem, number)[:, None], (1, len(self.distances.pairs)))
         self._watched[np.rint((intervals + positions) * SPREAD).astype(np.intp), pairs] = False
         k, s = at.real.astype(np.intp), np.ascontiguousarray(at.imag)
         self._batch = InstantBatch(self.grid, k, s, np.ones(len(k)))
-
-    def _round(self, rounding: Array) -> None:
-        """Round the shapes of rows by other sizes, (E,), in [m]; these rows are measured again."""
-        changed = rounding != self.rounding
-        self._measured = self._measured.mapped(lambda known: np.where(changed, np.nan, known))
-        self._take_rounding(rounding)
-
-    def _take_rounding(self, rounding: Array) -> None:
-        self.rounding = rounding
-        self._sizes = np.zeros(self._wanted.shape)
-        self._sizes[self._instant, self._column] = rounding
 
     def _configurations(self, path: DiscretePath, times: Array | None = None) -> Array:
         """q at the instants, as distances take it. times: of obstacles, instead of their own."""
@@ -362,9 +302,4 @@ class ClearanceRows:
     @property
     def _reach(self) -> float:
         """Distance beyond which a row is constant, in [m]."""
-        return self.least + CUTOFF[1] * DISTANCE_SCALE + MOST_INFLATION * MOST_ROUNDING
-
-
-def _rounding_of(y: Array) -> Array:
-    """Sizes by which the shapes of rows are rounded, in [m]. y: of the rows, (E,)."""
-    return np.clip(ROUNDED_FRACTION * DISTANCE_SCALE * y, LEAST_ROUNDING, MOST_ROUNDING)
+        return self.least + CUTOFF[1] * DISTANCE_SCALE + MOST_INFLATION * ROUNDING

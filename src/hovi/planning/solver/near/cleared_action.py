@@ -46,8 +46,6 @@ class ClearedAction(BoundedAction):
     """
 
     radii = 50.0, 50.0  # the neighborhood of obstacles is not convex
-    exact = False
-    """Whether models keep all curvature, so that a motion stays near the one it begins at."""
 
     def __init__(
         self,
@@ -85,7 +83,7 @@ class ClearedAction(BoundedAction):
     def outputs(self, x: DiscretePath) -> Outputs:
         """See BoundedAction.outputs."""
         base = super().outputs(x)
-        if self.near.size == 0 and not self.near.watchful:
+        if self.near.size == 0:
             return base
         value = np.inf if self.near.hidden_depth(x) > DEEPEST else base.value
         return Outputs(value, self.ordered(np.append(base.y, self.near.values(x))))
@@ -112,7 +110,7 @@ class ClearedAction(BoundedAction):
     @property
     def may_be_concave(self) -> bool:
         """See BoundedObjective."""
-        return self.near.size > 0 and not self.exact
+        return self.near.size > 0
 
     def model_without_concavity(self, x: DiscretePath) -> QuadraticModel | None:
         """See BoundedObjective: with the positive part of the rows' curvature."""
@@ -168,10 +166,9 @@ class ClearedAction(BoundedAction):
         found = self.rows.refine(x, level)
         if found is not None:  # before anything that may run out of time
             self._limit_outputs = RecentPaths()
-        sharper = self.near.sharpen(x)
         added = self.near.extend(self.problem, x, AHEAD * level * DISTANCE_SCALE)
         self.blocked = self.near.blocked
-        if found is None and added == 0 and not sharper:
+        if found is None and added == 0:
             return None
         kept, origin = np.arange(before), np.zeros(0, dtype=np.intp)
         if found is not None:
@@ -179,13 +176,13 @@ class ClearedAction(BoundedAction):
         return self._renumbered(order, before, kept, origin, added)
 
     def refine_at_once(self, x: DiscretePath) -> Refinement | None:
-        """Bound the distances of pairs that have come near in a step, and round shapes less."""
+        """Bound the distances of pairs that have come near in a step."""
         assert self.rows is not None
-        if self.near.size == 0 and not self.near.watchful:
+        if self.near.size == 0:
             return None
         order, before = self.near.order, self.rows.size
-        sharper, added = self.near.sharpen(x), self.near.follow(x)
-        if added == 0 and not sharper:
+        added = self.near.follow(x)
+        if added == 0:
             return None
         none = np.zeros(0, dtype=np.intp)
         return self._renumbered(order, before, np.arange(before), none, added)
@@ -224,20 +221,8 @@ class ClearedAction(BoundedAction):
         self.near.order = np.concatenate([places[order][remaining], fresh, last])
         self._with_rows()
         origins = np.where(origin < 0, -1, first + slots[origin])
-        both = (
-            np.append(np.arange(first), first + remaining),
-            np.append(origins, np.full(added, -1)),
-        )
-        return Refinement(*both, self._transfer() if added else None)
-
-    def _transfer(self) -> tuple[Index, Index] | None:
-        """Outputs of the rows of distances that were added last, and of kept ones near them."""
-        if self.near.transfer is None or self.rows is None:
-            return None
-        slots = np.empty(len(self.near.order), dtype=np.intp)
-        slots[self.near.order] = self._point_count + np.arange(len(slots))
-        new, nearby = (slots[self.rows.size + each] for each in self.near.transfer)
-        return new, nearby
+        remained = np.append(np.arange(first), first + remaining)
+        return Refinement(remained, np.append(origins, np.full(added, -1)))
 
     @property
     def _limit_count(self) -> int:

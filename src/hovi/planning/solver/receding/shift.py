@@ -34,9 +34,6 @@ from hovi.system.dataclass import dataclass
 
 Segmented = TypeVar("Segmented", SegmentedLagrangian, Limits)
 
-SPACING = 8.0
-"""Least ratio of barrier parameters of the points that are kept of a central path."""
-
 
 @dataclass(frozen=True, eq=False)
 class Shift:
@@ -157,11 +154,7 @@ class Shift:
         """
         if self._ratio != 1.0:
             return None
-        chosen: list[tuple[float, DiscretePath]] = []
-        for level, path in central.points[:-1]:
-            if not chosen or level * SPACING <= chosen[-1][0]:
-                chosen.append((level, path))
-        points = tuple((level, self.path(x)) for level, x in [*chosen, central.points[-1]])
+        points = tuple((level, self.path(x)) for level, x in central.points)
         if central.rows is None or not self._scaled_alike:
             return CentralPath(points, None)
         rows, kept = self._remainder.rows(central.rows)
