@@ -18,6 +18,8 @@ from hovi.planning.solver.solver import Solution, solve_on_grid
 from hovi.robot.mass_matrix import MassMatrix
 from hovi.system.dataclass import dataclass
 
+Array = npt.NDArray[np.float64]
+
 SAMPLES = 33
 """Samples per interval of the velocity, both ends included."""
 SPINNING_RATIO = 10.0
@@ -98,8 +100,8 @@ def fault_of_valley(
 
     Where a joint spins, or the finer solution is FAR away and the costs are not CLOSE, the two may
     be different motions along a valley without a minimum, whose costs say little about the error.
-    Then a still finer grid has to confirm the finer one: by a CLOSE cost where a joint spins, else
-    by a solution much nearer to it.
+    Then a still finer grid, of intervals of half the length, has to confirm the finer one: by a
+    CLOSE cost where a joint spins, else by a solution much nearer to it.
     error: relative error of the cost; None if the cost is only rounding. finer: the finer solution
         that it was compared with; None to compute it.
     """
@@ -111,28 +113,19 @@ def fault_of_valley(
     finer = finer or finer_than(solution)
     if finer is None:
         return ""
-    far = _distance(solution, finer)
+    far = _apart(solution, finer.path.q)
     if spinning is None and far <= FAR:
         return ""
-    known, finest = _still_finer(finer)
-    if known is not None and finest is not None:
-        if spinning is None and _distance(known, finest) <= CONTRACTION * far:
-            return ""
-        if spinning is not None and relative_difference(finest.known, finest.cost) <= CLOSE:
+    known = _finished(finer)
+    halves = None if known is None else _on_halves(known)
+    if known is not None and halves is not None:
+        nearer = _apart(known, halves.trajectory.q[::2]) <= CONTRACTION * far
+        if nearer if spinning is None else relative_difference(known.cost, halves.cost) <= CLOSE:
             return ""
     moved = f"a finer grid moves it by up to {far:.2g}, and"
     if spinning is not None:
         moved = f"at {spinning.speed:.3g} rad/s a finer grid confirms it, but"
     return f"{moved} a still finer one does not confirm that"
-
-
-def _still_finer(finer: FinerSolution) -> tuple[Solution | None, FinerSolution | None]:
-    """The finer solution as a minimum, and one near it on a still finer grid; None for none."""
-    try:
-        known = _finished(finer)
-        return known, None if known is None else finer_than(known)
-    except HoviError:
-        return None, None
 
 
 def _finished(finer: FinerSolution) -> Solution | None:
@@ -143,12 +136,24 @@ def _finished(finer: FinerSolution) -> Solution | None:
     return known if known.success else None
 
 
-def _distance(solution: Solution, finer: FinerSolution) -> float:
+def _on_halves(known: Solution) -> Solution | None:
+    """The minimum near another one on halves of its intervals; None if there is none."""
+    assert known.problem is not None
+    halves = known.problem.on(known.problem.grid.halved())
+    try:
+        found = solve_on_grid(halves, known.trajectory, max_iterations=MAX_FINER_STEPS)
+    except HoviError:
+        return None
+    return found if found.success else None
+
+
+def _apart(solution: Solution, q: Array) -> float:
     """Largest difference of a coordinate at the nodes, in [rad] or [m]; 0 if the nodes differ."""
-    q, other = solution.trajectory.q, finer.path.q
-    if q.shape != other.shape:
+    own, problem = solution.trajectory.q, solution.problem
+    assert problem is not None
+    if own.shape != q.shape:
         return 0.0
-    return float(np.abs(finer.problem.coordinates.difference(q, other)).max())
+    return float(np.abs(problem.coordinates.difference(own, q)).max())
 
 
 def _unlimited_angles(problem: TrajectoryProblem) -> npt.NDArray[np.bool_]:
