@@ -24,6 +24,7 @@ SOLVER = re.compile(
     r"^\s*(from|import) hovi\.(optimize|planning\.(solver|refinement|search))\b", re.M
 )
 WITH_ORACLES = {
+    "accuracy/test_lighter_rotors.py",
     "optimize/test_banded_model.py",
     "optimize/test_batched_newton.py",
     "optimize/test_bordered_model.py",
@@ -31,7 +32,6 @@ WITH_ORACLES = {
     "optimize/test_merge_tree.py",
     "oracles/on_grid.py",
     "planning/conditions/test_derivatives.py",
-    "accuracy/test_lighter_rotors.py",
     "planning/refinement/test_hp_refinement.py",
     "planning/solver/free_duration/test_parts_of_free_length.py",
     "planning/solver/limits/test_limit_rows.py",

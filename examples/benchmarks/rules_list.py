@@ -565,7 +565,6 @@ _rule(
     "isinstance(goal, FrameGoal) and not is_near(goal, problem, path)",
     "False",
 )
-_at("warm starts", "planning.solver.receding.shift")
 _at("warm starts", "planning.solver.receding.remainder")
 _rule(
     "short rests are merged",
@@ -649,7 +648,6 @@ _rule(
     "PASSES if len(at) else 0",
     "0",
 )
-_at("distances", "planning.solver.near.clearance_rows")
 _at("distances", "planning.solver.near.cleared_action")
 _rule(
     "refuse hidden depth",
@@ -681,7 +679,6 @@ _rule(
     "not long.any()",
     "True",
 )
-_at("limits", "planning.solver.methods.torque_rates_last")
 _at("limits", "planning.solver.methods.limits_between_points")
 _rule(
     "tighten bounds",
@@ -1046,5 +1043,3 @@ _rule(
     "not may_help(found[0])",
     "True",
 )
-_at("continuation", "planning.search.homotopies")
-_at("continuation", "planning.search.continuation")

@@ -26,7 +26,7 @@ def job(scene: Scene) -> Job:
 def test_rotors_fall_from_more_than_every_link_to_less_than_any(arm_scene: Scene) -> None:
     M = pin.crba(arm_scene.model, arm_scene.model.createData(), HANG)
     M = np.triu(M) + np.triu(M, 1).T
-    sizes = [float(stage.name.split()[2]) for stage in lighter_rotors(job(arm_scene))]
+    sizes = [float(each.scene.model.armature[0]) for each in lighter_rotors(job(arm_scene))]
     assert sizes[0] == pytest.approx(10 * M.diagonal().max(), rel=0.05)
     least = np.linalg.eigvalsh(M)[0]
     assert 0.1 * least < sizes[-1] <= least
@@ -34,13 +34,13 @@ def test_rotors_fall_from_more_than_every_link_to_less_than_any(arm_scene: Scene
 
 
 def test_easier_scenes_have_the_torques_of_rotors(arm_scene: Scene) -> None:
-    stages = lighter_rotors(job(arm_scene))
-    assert len(stages) >= 3
-    for stage in stages:
-        used = stage.job.scene
+    easier = lighter_rotors(job(arm_scene))
+    assert len(easier) >= 3
+    for each in easier:
+        used = each.scene
         rotor = used.model.armature - arm_scene.model.armature
         assert np.ptp(rotor) == pytest.approx(0.0, abs=1e-15)
-        assert rotor[0] == pytest.approx(float(stage.name.split()[2]), rel=0.05)
+        assert rotor[0] > 0.0
         model = arm_scene.model.copy()
         model.armature = model.armature + rotor
         data = model.createData()

@@ -23,25 +23,17 @@ if TYPE_CHECKING:
 
 
 FIRST_ROTOR_RATIO = 10.0
-"""Rotor inertia of the first stage, relative to the largest diagonal entry of the mass matrix."""
+"""Rotor inertia of the easiest problem, relative to the largest diagonal entry of M."""
 ROTOR_REDUCTION = 10.0
-"""Factor by which the rotor inertia is reduced from stage to stage."""
+"""Factor by which the rotor inertia is reduced from one to the next."""
 LAST_ROTOR_RATIO = 0.1
-"""Smallest rotor inertia, relative to the smallest eigenvalue of the mass matrix."""
+"""Smallest rotor inertia, relative to the smallest eigenvalue of M."""
 
 
-@dataclass(frozen=True, eq=False)
-class Stage:
-    """One of the problems, and a few words on how it differs from the last one."""
+def lighter_rotors(job: Job) -> list[Job]:
+    """The job with rotor inertia c on every joint, M(q) + c 1, with c decreasing to zero.
 
-    name: str
-    job: Job
-
-
-def lighter_rotors(job: Job) -> list[Stage]:
-    """Rotor inertia c on every joint, M(q) + c 1, with c decreasing to zero.
-
-    The easiest problem first, without the job itself; none where rotors change no cost.
+    The easiest one first, without the job itself; none where rotors change no cost.
     """
     if not job.lagrangian().needs_torques:
         return []
@@ -50,14 +42,13 @@ def lighter_rotors(job: Job) -> list[Stage]:
     M = MassMatrix(job.scene.model)(q[None])[0]
     inertia = FIRST_ROTOR_RATIO * float(M.diagonal().max())
     least = LAST_ROTOR_RATIO * float(np.linalg.eigvalsh(M)[0])
-    stages = []
+    easier = []
     while inertia > least:
         effects = [*job.scene.effects, HeavierRotors(inertia)]
         scene = dataclasses.replace(job.scene, effects=effects)
-        name = f"rotors of {inertia:.2g} kg m^2"
-        stages.append(Stage(name, dataclasses.replace(job, scene=scene)))
+        easier.append(dataclasses.replace(job, scene=scene))
         inertia /= ROTOR_REDUCTION
-    return stages
+    return easier
 
 
 @dataclass(frozen=True)
@@ -76,4 +67,4 @@ class HeavierRotors(Effect):
 
     def describe(self) -> str:
         """One line for the description of a scene."""
-        return f"{self.inertia:.3g} kg m^2 or kg on every joint, to begin with"
+        return f"{self.inertia:.3g} kg m^2 or kg on every joint"

@@ -91,7 +91,7 @@ def find_reference(task: Task, budget: Budget, progress: Progress) -> Reference:
 def _require_usable(found: Solution, unresolved: bool) -> None:
     """Raise UnmeasurableError unless the motion is a minimum, or unresolved if that is allowed.
 
-    `plan` trusts no grid with a joint that spins; whether one resolves it is then found out here.
+    A motion that no finer grid confirms to `plan`, as where a joint spins, may be resolved here.
     """
     raise_if_interrupted()
     usable = (Status.MINIMUM, Status.UNRESOLVED) if unresolved else (Status.MINIMUM,)
@@ -139,9 +139,9 @@ def _from_rotors(task: Task, budget: Budget) -> Solution:
         Job(task.planned_scene, grid, task.start_state, task.goal, options), options.guess
     )
     guess: str | Trajectory = options.guess
-    for stage in lighter_rotors(job):
+    for easier in lighter_rotors(job):
         left = budget.left_of(SEARCH_FRACTION)
-        solution = solve_on_grid(stage.job.problem(), guess, time_limit=left)
+        solution = solve_on_grid(easier.problem(), guess, time_limit=left)
         if solution.status not in (Status.DIVERGED, Status.INFEASIBLE):
             guess = solution.trajectory
         raise_if_interrupted()

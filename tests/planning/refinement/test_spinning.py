@@ -142,15 +142,9 @@ def test_a_fast_spinning_motion_that_finer_grids_confirm_is_a_minimum() -> None:
     assert moved.error_estimate not in (found.error_estimate, 2 * (found.error_estimate or 0.0))
 
 
-@pytest.mark.parametrize(
-    ("name", "seed", "intervals", "said"),
-    [("xarm7", 21, 20, "rad/s a finer grid confirms it")],
-)
-def test_a_motion_that_still_finer_grids_refute_is_no_minimum(
-    name: str, seed: int, intervals: int, said: str
-) -> None:
-    robot = hovi.load_robot(name)
-    rng = np.random.default_rng(seed)
+def test_a_motion_that_still_finer_grids_refute_is_no_minimum() -> None:
+    robot = hovi.load_robot("xarm7")
+    rng = np.random.default_rng(21)
     low, high = np.maximum(robot.lower, -2.5), np.minimum(robot.upper, 2.5)
     start, goal = (
         (low + high) / 2 + 0.6 * (high - low) / 2 * rng.uniform(-1, 1, robot.nq) for _ in range(2)
@@ -159,8 +153,8 @@ def test_a_motion_that_still_finer_grids_refute_is_no_minimum(
         hovi.Scene(robot, [hovi.effects.Gravity()]),
         start,
         goal,
-        [1.0, 2.0, 3.0, 4.0][seed % 4],
-        intervals=intervals,
+        2.0,
+        intervals=20,
         scheme="galerkin-4x10",
         limits="none",
         processes=1,
@@ -168,8 +162,7 @@ def test_a_motion_that_still_finer_grids_refute_is_no_minimum(
         continuation=False,
     )
     assert found.status is hovi.Status.UNRESOLVED, found.message
-    assert said in found.message
-    assert "a still finer one does not confirm that" in found.message
+    assert "rad/s a finer grid confirms it, but a still finer one does not" in found.message
     assert found.problem is not None
     quarters = found.problem.on(found.problem.grid.halved().halved())
     finer = solve_on_grid(quarters, found.trajectory)

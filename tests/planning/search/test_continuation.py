@@ -74,7 +74,7 @@ def test_masses_of_a_million_to_one_are_solved_by_more_steps(
     texts, shares = zip(*reports.continued, strict=True)
     assert list(shares) == sorted(shares)
     assert 0 <= shares[0] <= shares[-1] <= 1
-    assert set(texts) == {"continuation: more steps from the best motion"}
+    assert set(texts) == {"continuation: more steps from the last motion"}
 
 
 def test_a_plan_without_continuation_is_one_solve(light_hand: Scene, failed: Solution) -> None:
@@ -112,7 +112,7 @@ def test_among_obstacles_a_motion_at_its_iteration_limit_gets_more_steps() -> No
 def test_a_deadline_ends_the_continuation_with_the_best_so_far(
     light_hand: Scene, failed: Solution, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A clock that leaps at the first stage."""
+    """A clock that leaps at the first solve."""
     late = LeapingClock(monkeypatch).leap
     found = swung(light_hand, time_limit=1e5, progress=Reports(late))
     assert (found.success, found.status) == (False, Status.TIME_LIMIT)
@@ -120,7 +120,7 @@ def test_a_deadline_ends_the_continuation_with_the_best_so_far(
     assert "Continuation reached the time limit" in found.message
 
 
-@pytest.mark.parametrize("where", ["within a stage", "between two"])
+@pytest.mark.parametrize("where", ["within a solve", "between two"])
 def test_an_interrupt_ends_the_continuation_with_the_best_so_far(
     light_hand: Scene, failed: Solution, monkeypatch: pytest.MonkeyPatch, where: str
 ) -> None:
@@ -139,7 +139,7 @@ def test_an_interrupt_ends_the_continuation_with_the_best_so_far(
     assert evaluations.calls <= 60
 
 
-def test_an_interrupt_between_two_stages_ends_the_whole_call(light_hand: Scene) -> None:
+def test_an_interrupt_between_two_solves_ends_the_whole_call(light_hand: Scene) -> None:
     def interrupt() -> None:
         raise KeyboardInterrupt
 
@@ -171,7 +171,7 @@ def test_problems_that_fail_before_any_step_are_not_continued(arm_scene: Scene) 
 
 @pytest.mark.filterwarnings("ignore:invalid value encountered in matmul")
 def test_a_guess_of_infinite_cost_is_not_continued(two_link: hovi.Robot) -> None:
-    """Nor would easier problems have a finite cost there."""
+    """Nor would more steps lead to a finite cost."""
     steep = hovi.effects.RunningCost({"steep": 'exp(1e3*(q["shoulder"] + 1))'})
     reports, grid = Reports(), GRID | {"intervals": 8}
     scene = Scene(two_link, [Gravity(9.8), steep])

@@ -1,5 +1,7 @@
 """Spinning joints: without limits and rotors a light joint spins, faster on every finer grid.
 
+Valleys without a minimum are also recognized without such a joint: see `fault_of_valley`.
+
 Spinning a link of inertia I up costs a torque of the order of I, while its reaction on the other
 joints grows with the square of its velocity. For small I the least torque is found at velocities
 that no joint of a robot reaches, if there is a minimum at all.
@@ -108,24 +110,43 @@ def fault_of_valley(
     problem = solution.problem
     assert problem is not None
     spinning = spin_without_limits(solution)
-    if problem.has_limits or error is None or (spinning is None and error <= CLOSE):
+    if problem.has_limits or error is None:
         return ""
-    finer = finer or finer_than(solution)
-    if finer is None:
+    if spinning is None and (problem.limited or error <= CLOSE):
         return ""
-    far = _apart(solution, finer.path.q)
-    if spinning is None and far <= FAR:
-        return ""
-    known = _finished(finer)
-    halves = None if known is None else _on_halves(known)
-    if known is not None and halves is not None:
-        nearer = _apart(known, halves.trajectory.q[::2]) <= CONTRACTION * far
-        if nearer if spinning is None else relative_difference(known.cost, halves.cost) <= CLOSE:
+    where = "" if spinning is None else f"at {spinning.speed:.3g} rad/s "
+    try:
+        finer = finer or finer_than(solution)
+        far = 0.0 if finer is None else _apart(solution, finer.path.q)
+        if spinning is None and far <= FAR:
             return ""
-    moved = f"a finer grid moves it by up to {far:.2g}, and"
-    if spinning is not None:
-        moved = f"at {spinning.speed:.3g} rad/s a finer grid confirms it, but"
-    return f"{moved} a still finer one does not confirm that"
+        known = None if finer is None else _finished(finer)
+        if known is None:
+            return f"{where}no minimum was found near it on a finer grid"
+        if _is_confirmed(known, spinning is not None, far):
+            return ""
+    except HoviError:
+        return "" if spinning is None else f"{where}no finer grid could be tried"
+    if spinning is None:
+        return (
+            f"a finer grid moves it by up to {far:.2g}, and a still finer one does not confirm that"
+        )
+    return f"{where}a finer grid confirms it, but a still finer one does not"
+
+
+def _is_confirmed(known: Solution, spins: bool, far: float) -> bool:
+    """Whether halves of the intervals confirm a finer solution.
+
+    far: its distance from the motion, see `_apart`.
+    """
+    assert known.problem is not None
+    halves = known.problem.on(known.problem.grid.halved())
+    found = solve_on_grid(halves, known.trajectory, max_iterations=MAX_FINER_STEPS)
+    if not found.success:
+        return False
+    if spins:
+        return relative_difference(known.cost, found.cost) <= CLOSE
+    return _apart(known, found.trajectory.q[::2]) <= CONTRACTION * far
 
 
 def _finished(finer: FinerSolution) -> Solution | None:
@@ -134,17 +155,6 @@ def _finished(finer: FinerSolution) -> Solution | None:
     if known is None:
         known = solve_on_grid(finer.problem, finer.path, max_iterations=MAX_FINER_STEPS)
     return known if known.success else None
-
-
-def _on_halves(known: Solution) -> Solution | None:
-    """The minimum near another one on halves of its intervals; None if there is none."""
-    assert known.problem is not None
-    halves = known.problem.on(known.problem.grid.halved())
-    try:
-        found = solve_on_grid(halves, known.trajectory, max_iterations=MAX_FINER_STEPS)
-    except HoviError:
-        return None
-    return found if found.success else None
 
 
 def _apart(solution: Solution, q: Array) -> float:

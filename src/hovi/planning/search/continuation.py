@@ -20,7 +20,7 @@ UNUSABLE = Status.DIVERGED, Status.INFEASIBLE
 
 
 def may_help(solution: Solution) -> bool:
-    """Whether continuation may find a minimum that a direct solve did not."""
+    """Whether a direct solve ran out of iterations, so that more steps may find a minimum."""
     return solution.status is Status.ITERATION_LIMIT and solution.nit > 0
 
 
@@ -36,23 +36,25 @@ def solve_by_continuation(
     None. progress: called before each. The message says how it went; nit counts the steps of the
     last solve only.
     """
-    deadline, best, steps, solves = deadline or Deadline(), failed, 0, 0
+    deadline, last, best, steps = deadline or Deadline(), failed, failed, 0
     try:
-        while best.status is Status.ITERATION_LIMIT and solves < MAX_SOLVES:
+        for i in range(MAX_SOLVES):
             if progress is not None:
-                progress("continuation: more steps from the best motion", solves / MAX_SOLVES)
-            found = solve_on_grid(
+                progress("continuation: more steps from the last motion", i / MAX_SOLVES)
+            last = solve_on_grid(
                 job.problem(),
-                best.trajectory,
+                last.trajectory,
                 max_iterations=job.options.max_iterations,
                 time_limit=deadline.seconds_left,
                 barrier=job.barrier,
             )
-            steps, solves = steps + found.nit, solves + 1
-            if found.status in UNUSABLE:
+            steps += last.nit
+            if last.success or (last.status not in UNUSABLE and last.cost < best.cost):
+                best = last
+            if last.status is not Status.ITERATION_LIMIT:
                 break
-            cheaper = found.success or found.cost < best.cost
-            best = found if cheaper else dataclasses.replace(best, status=found.status)
+        if last.status in STOPPED:
+            best = dataclasses.replace(best, status=last.status)
     except KeyboardInterrupt:
         record_interrupt()
         best = dataclasses.replace(best, status=Status.INTERRUPTED)

@@ -322,7 +322,7 @@ class Search:
         return dataclasses.replace(found, branches=tuple(branches), isolated=job.isolated)
 
     def _continued(self, job: Job, found: list[Solution]) -> list[Solution]:
-        """The solutions, or the result of continuation if there is no minimum among them."""
+        """The solutions, or what continuation makes of the best where that ran out of steps."""
         options = self.fine.options
         if interrupted() or self.deadline.passed or not options.continuation:
             return found

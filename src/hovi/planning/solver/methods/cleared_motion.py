@@ -41,8 +41,8 @@ def cleared_motion(search: BoundedSearch, guess: DiscretePath) -> Bounded:
     """A motion within limits that keeps its distances, from a guess that may keep neither.
 
     It is solved without distances, until it can be seen whether it keeps them. If it does not, it
-    is moved out of the obstacles, or the guess is where that fails; a rough motion from there is
-    solved to its end.
+    is moved out of the obstacles, and a rough motion from there is solved to its end; where there
+    is no such rough motion, the guess is moved out instead.
     """
     assert search.near is not None
     free = _without_distances(search, guess)
@@ -84,7 +84,7 @@ def _rough_with_constraints(search: BoundedSearch, guess: DiscretePath) -> Bound
 
 
 def _moved_out(search: BoundedSearch, path: DiscretePath) -> Bounded | None:
-    """The solution from a path that is moved out of obstacles; None where that leads nowhere.
+    """The solution from a path that is moved out of obstacles; None without a rough motion.
 
     A rough motion from there shows which pairs stay near: these alone keep their rows.
     """
