@@ -301,6 +301,15 @@ class Limits(LimitsSummary):
                 f"expected the limits that `to_dict` returns, got data with {error!r}."
             ) from error
 
+    def without(self, *kinds: str) -> Limits:
+        """The same limits but for those of some kinds, which are unbounded."""
+        if self.parts:
+            return Limits.of_segments([part.without(*kinds) for part in self.parts], self.ends)
+        rows = [row for row, kind in enumerate(self.kinds) if kind in kinds]
+        lower, upper = self.lower.copy(), self.upper.copy()
+        lower[rows], upper[rows] = -np.inf, np.inf
+        return self._between(lower, upper)
+
     def excess(self, outputs: Array) -> Array:
         """Distance of each output outside its range, as a fraction of the range; negative inside.
 
