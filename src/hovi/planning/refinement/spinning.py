@@ -112,7 +112,9 @@ def fault_of_valley(
     spinning = spin_without_limits(solution)
     if problem.has_limits or error is None:
         return ""
-    if spinning is None and (problem.limited or error <= CLOSE):
+    if problem.limited and (spinning is None or error <= CLOSE):
+        return ""
+    if spinning is None and error <= CLOSE:
         return ""
     where = "" if spinning is None else f"at {spinning.speed:.3g} rad/s "
     try:
