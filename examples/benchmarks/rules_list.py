@@ -207,6 +207,13 @@ _rule(
     "True",
 )
 _rule(
+    "radius grows fourfold",
+    "Among obstacles the radius grows by four where the model predicted the decrease to 5 %.",
+    "BoundedSteps.radius_after",
+    "alike and reopens and length > 0.7 * last",
+    "False",
+)
+_rule(
     "radius follows cut steps",
     "A step at the radius that bounds cut to less than a tenth shortens the radius.",
     "BoundedSteps.radius_after",
@@ -314,6 +321,13 @@ _rule(
     "False",
 )
 _rule(
+    "save again",
+    "A later iterate takes the place of a saved one up to 1.5 times its product.",
+    "_Iteration._save",
+    "product <= SAVED_AGAIN * self.first_product",
+    "False",
+)
+_rule(
     "drop saved iterates",
     "Saved iterates with a smaller mu are dropped where mu is raised.",
     "_Iteration._drop_saved",
@@ -363,6 +377,13 @@ _rule(
     "Barrier.refined",
     "origin >= 0",
     "origin < -1",
+)
+_rule(
+    "fraction to the boundary grows",
+    "The largest share of a gap in one step grows as mu falls.",
+    "Barrier.boundary_fraction",
+    "min(max(FRACTION_TO_BOUNDARY, 1.0 - self.mu / self.scale), LARGEST_FRACTION)",
+    "FRACTION_TO_BOUNDARY",
 )
 _at("equations", "optimize.lagrange_newton")
 _rule(
@@ -468,6 +489,20 @@ _rule(
     "BoundedSearch._add_points",
     "self.points or ([] if self.along is None else self.along.points)",
     "[]",
+)
+_rule(
+    "look around",
+    "Pairs within 2 cm of a known motion get rows at once.",
+    "BoundedSearch.look_around",
+    "self.near is not None",
+    "False",
+)
+_rule(
+    "wide radius at a level",
+    "A solve that begins on a central path has a wide first radius among obstacles.",
+    "BoundedSearch._objective",
+    "(BoundedAction if self.at_level else ClearedAction).radii",
+    "ClearedAction.radii",
 )
 _at("warm starts", "planning.solver.central_path")
 _rule(
@@ -600,24 +635,38 @@ _rule(
 _rule(
     "push out of obstacles",
     "A rough motion is moved out of obstacles without its dynamics.",
-    "_moved_out",
+    "_rough_with_distances",
     "pushed_out(problem, path, distances, search.near.least)",
     "path",
 )
 _rule(
+    "detours are compared",
+    "Where the moved motion is a detour or none, the guess is moved out as well.",
+    "cleared_motion",
+    "rough[0] is None or rough[0].rank > (False, DETOUR * abs(free.outputs.value))",
+    "False",
+)
+_rule(
     "rows ahead",
     "Pairs within 6 cm get rows before a rough motion is solved.",
-    "_moved_out",
+    "_rough_with_distances",
     "search.near.extend(problem, moved, AHEAD)",
     "search.near.extend(problem, moved, 0.0)",
     False,
 )
 _rule(
+    "watch from the first",
+    "A rough motion is watched for near pairs before it has any rows.",
+    "_rough_with_distances",
+    "True",
+    "False",
+)
+_rule(
     "rows of far pairs are dropped",
     "After a rough motion pairs beyond 3 cm lose their rows.",
-    "_moved_out",
-    "search.near.thinned(x, KEPT)",
-    "search.near.thinned(x, 1e9)",
+    "_Rough.solved",
+    "self.near.thinned(x, KEPT)",
+    "self.near.thinned(x, 1e9)",
 )
 _at("distances", "planning.solver.near.approaches")
 _rule(
@@ -648,13 +697,29 @@ _rule(
     "PASSES if len(at) else 0",
     "0",
 )
+_at("distances", "planning.solver.near.clearance_rows")
+_rule(
+    "rounded shapes",
+    "Shapes are rounded the more, the farther a pair is from its bound.",
+    "_rounding_of",
+    "np.clip(ROUNDED_FRACTION * DISTANCE_SCALE * y, LEAST_ROUNDING, MOST_ROUNDING)",
+    "np.full(np.shape(y), LEAST_ROUNDING)",
+)
 _at("distances", "planning.solver.near.cleared_action")
 _rule(
-    "refuse hidden depth",
-    "A step that brings a pair without a row too deep is refused.",
+    "refuse depth",
+    "A step that takes a pair deeper than before, and too deep, is refused.",
     "ClearedAction.outputs",
-    "self.near.hidden_depth(x) > DEEPEST",
+    "self.near.depth(x) > self._deepest",
     "False",
+)
+_rule(
+    "sharpen shapes at once",
+    "Shapes are rounded less after any step that brings a row nearer to its bound.",
+    "ClearedAction.refine_at_once",
+    "self.near.sharpen(x)",
+    "False",
+    False,
 )
 _at("limits", "planning.solver.limits.limit_rows")
 _rule(

@@ -92,7 +92,7 @@ def test_the_best_duration_is_that_of_a_scalar_search_around_solves(kind: str) -
     bracket = (0.95 * T, 1.01 * T, 1.1 * T) if limited else (0.99 * T, 1.001 * T, 1.01 * T)
     searched = minimize_scalar(total, bracket=bracket, options={"xtol": 1e-9, "maxiter": 20})
     assert pytest.approx(searched.x, rel=3e-3 if limited else 1e-6) == T
-    assert found.cost == pytest.approx(searched.fun, rel=2e-5 if limited else 1e-11)
+    assert found.cost == pytest.approx(searched.fun, rel=1e-5 if limited else 1e-11)
     if not limited:  # dS/dT + w by a stencil of sixth order
         h, stencil = 3e-3 * T, {1: 45 / 60, 2: -9 / 60, 3: 1 / 60}
         slope = sum(c * (total(T + k * h) - total(T - k * h)) for k, c in stencil.items()) / h
@@ -100,16 +100,17 @@ def test_the_best_duration_is_that_of_a_scalar_search_around_solves(kind: str) -
 
 
 def test_further_starts_begin_at_other_durations() -> None:
-    """Between a fast motion and a slow one, the cost of this reach has a hump."""
+    """Between a fast motion and a slow one, the cost of this reach has a hump at half a second."""
     scene = hovi.Scene(hovi.load_robot("ur5"), [Gravity()])
-    start, goal = np.random.default_rng(8).uniform(-1.5, 1.5, (2, 6))
-    given = {"time_weight": 100.0, "processes": 1, "self_collision": False}
+    start = hovi.State([0.0, -1.4, 1.6, -0.2, 0.5, 0.0])
+    aim = hovi.FrameGoal("tool0", position=[0.45, 0.25, 0.25])
     one, three = (
-        hovi.plan(scene, start, goal, (0.2, 4.0), starts=starts, **given) for starts in (1, 3)
+        hovi.plan(scene, start, aim, (0.2, 4.0), time_weight=100.0, starts=starts, processes=1)
+        for starts in (1, 3)
     )
     assert one.success, one.message
     assert three.success, three.message
-    assert three.cost < 0.8 * one.cost
+    assert three.cost < 0.6 * one.cost
     assert abs(three.duration_derivative + 100.0) <= 1e-4
 
 

@@ -94,7 +94,7 @@ def test_effects_see_the_time_since_the_first_motion(
     found, torque = timed
     rest = found.advance(elapsed)
     assert rest.success, rest.message
-    assert apart(rest, found, elapsed) < 2e-3
+    assert apart(rest, found, elapsed) < 1e-4
     assert torque_error(rest.trajectory, torque, arm, elapsed) < 1e-9
     assert torque_error(rest.trajectory, torque, arm, 0.0) > 1e-3
 
@@ -300,7 +300,7 @@ def test_segments_that_have_passed_are_dropped(
 ) -> None:
     rest = sequence.advance(elapsed)
     assert rest.success, rest.message
-    assert apart(rest, sequence, elapsed) < 2e-3
+    assert apart(rest, sequence, elapsed) < 1e-4
     assert_carried(rest, arm, elapsed)
     left = sum(end > elapsed + 1e-9 for end in (0.5, 1.3, 2.2))
     segments = rest.trajectory.segments

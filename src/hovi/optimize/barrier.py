@@ -28,7 +28,10 @@ LEAST_GAP = 1e-16
 MAX_DUAL_RATIO = 1e8
 """Largest ratio, either way, of a multiplier and mu over its gap."""
 FRACTION_TO_BOUNDARY = 0.99
-"""Largest fraction of the distance to a bound in one step."""
+"""Largest fraction of the distance to a bound in one step while mu is large."""
+LARGEST_FRACTION = 1.0 - 1e-4
+"""The same when mu is small: a slack nearer to its bound than mu over its multiplier takes a gap
+below rounding errors."""
 SLACK_MATCHED = 1e-9
 """Largest |y - s| at which the slack has reached its output and limits the length of a step."""
 
@@ -199,7 +202,7 @@ class Barrier:
     def aim(self, y: Array, dy: Array, targets: Pair) -> Direction:
         """The Newton direction that belongs to a change dy, with products that aim at targets."""
         ds, dzl, dzu = (np.empty_like(y) for _ in range(3))
-        limits = SLACK_MATCHED, FRACTION_TO_BOUNDARY
+        limits = SLACK_MATCHED, self.boundary_fraction
         ends = native.aim(*self.arrays, y, dy, *targets, *limits, ds, dzl, dzu)
         return Direction(dy, ds, dzl, dzu, *ends)
 
@@ -229,7 +232,7 @@ class Barrier:
     def merit(self, y: Array, penalty: float, along: Direction, fraction: float) -> float:
         """The barrier plus penalty sum weights |y - s| after a fraction of a direction."""
         w, d = self.bounds.weights, along
-        numbers = fraction, FRACTION_TO_BOUNDARY, self.mu, penalty
+        numbers = fraction, self.boundary_fraction, self.mu, penalty
         return native.merit(*self.arrays, w, y, d.dy, d.ds, *numbers)
 
     def moved(self, y: Array, along: Direction, fraction: float, penalty: float) -> Barrier:
@@ -239,7 +242,7 @@ class Barrier:
         the merit.
         """
         s, zl, zu = (np.empty_like(y) for _ in range(3))
-        keep = FRACTION_TO_BOUNDARY
+        keep = self.boundary_fraction
         dual = 1.0 if along.dual >= 1.0 else keep * along.dual
         d = (along.ds, along.dzl, along.dzu)
         numbers = (fraction, dual, keep, self.mu, penalty, MAX_DUAL_RATIO)
@@ -278,6 +281,11 @@ class Barrier:
     def complementarity(self) -> float:
         """The largest |z gap - mu|."""
         return native.largest_miss(*self.arrays, self.mu)
+
+    @property
+    def boundary_fraction(self) -> float:
+        """Largest fraction of a gap that one step takes."""
+        return min(max(FRACTION_TO_BOUNDARY, 1.0 - self.mu / self.scale), LARGEST_FRACTION)
 
     def _clipped(self) -> Barrier:
         """Multipliers limited to a range around the central path, zero where there is no bound."""

@@ -11,7 +11,7 @@ from typing import Generic, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from hovi.optimize.barrier import FRACTION_TO_BOUNDARY, Barrier, Direction, Pair
+from hovi.optimize.barrier import Barrier, Direction, Pair
 from hovi.optimize.bounded_objective import BoundedObjective
 from hovi.optimize.criteria import Criteria
 from hovi.optimize.ended import Ended
@@ -36,9 +36,11 @@ LONG_STEP = 0.95
 SHORTER_FRACTIONS = 0.8, 0.6, 0.4, 0.2, 0.1, 0.03, 0.01, 1e-3
 """Fractions of the longest step that are tried: of a plain one while they predict more, so that
 it ends away from the bounds; of a corrected one until one of them predicts a decrease."""
-ALIKE, CUT_GROWTH = 0.05, 2.0
+ALIKE, MOST_GROWTH = 0.05, 4.0
 """Relative difference of the actual and the predicted decrease up to which the radius grows by the
-second of these where bounds, which are not satisfied yet, cut a step at the radius."""
+second of these, if the objective reopens; others begin with a radius that is wide enough."""
+CUT_GROWTH = 2.0
+"""The same of others where bounds, which are not satisfied yet, cut a step at the radius."""
 SHORT_FRACTION = 0.1
 """Fraction of a step at the radius below which it was too long for the bounds that cut it."""
 MATCHED = 1e-4
@@ -195,7 +197,7 @@ class BoundedSteps(Generic[X]):
             return before - barrier.merit(y, self.penalty, along, fraction) - smooth
 
         inside = along.primal >= 1.0  # a slack at the end of a whole step is kept off its bound
-        longest = 1.0 if inside else FRACTION_TO_BOUNDARY * along.primal
+        longest = 1.0 if inside else barrier.boundary_fraction * along.primal
         fraction, predicted = longest, decrease(longest)
         for shorter in SHORTER_FRACTIONS:
             if abs(predicted) <= 10 * self.noise or (pulled is not None and predicted > 0):
@@ -214,6 +216,8 @@ class BoundedSteps(Generic[X]):
         length = norm * step.fraction
         radius, reopens = next_radius(last, length, ratio), self.objective.reopens
         alike = abs(ratio - 1.0) <= ALIKE
+        if alike and reopens and length > 0.7 * last:
+            return max(radius, MOST_GROWTH * last)
         unmatched = self.ended.violation > MATCHED
         if alike and unmatched and not (reopens or step.trial.newton):
             return max(radius, CUT_GROWTH * last)  # bounds cut the step, and not the model

@@ -90,7 +90,7 @@ class Ended(Generic[X, Z]):
     model: the last quadratic model, of a stationary point. convex: whether that was exact, with a
         Hessian that is positive definite, under equations on their tangent space.
     saddles: values at the saddles that were left along negative curvature.
-    saved: the first iterate, and the first after each halving of the mean product z gap, with it.
+    saved: the last iterates before the mean product z gap had halved, with that product.
     kept: the point of least objective so far that keeps the bounds to KEPT, and the outputs there;
         None for none. It is the final point where time runs out.
     """

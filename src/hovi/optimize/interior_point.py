@@ -66,6 +66,8 @@ that an inexact model led to, and the least distance of slacks from their bounds
 the range, per barrier parameter."""
 REOPENED_LEVEL = 0.3
 """The least such parameter, relative to the mean product of multipliers and gaps."""
+SAVED_AGAIN = 1.5
+"""A saved iterate is replaced while the mean product is below this many times its first one."""
 MAX_REFINEMENTS = 40
 """Maximum number of refinements."""
 CUT_FRACTION, MOST_CUT, RAISED = 0.5, 4, 10.0
@@ -215,11 +217,13 @@ class _Iteration(BoundedSteps[X]):
         return self.objective.hold(self.ended.x, sign * reaction)
 
     def _save(self, x: X) -> None:
-        """Save an iterate whenever the product has halved."""
+        """Save an iterate: the last one before the product halves."""
         product, saved = self.product, self.ended.saved
         if not saved or product < 0.5 * self.first_product:
             self.first_product = product
             saved.append((product, x))
+        elif product <= SAVED_AGAIN * self.first_product:
+            saved[-1] = min(product, self.first_product), x
 
     def _end(self, model: QuadraticModel) -> None:
         """End at a stationary point with its exact model."""

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import re
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import pinocchio as pin
 import pytest
 
 import hovi
 from hovi.planning.problem.tolerance import Tolerance
 from oracles.on_grid import solve_on_grid
+
+Array = npt.NDArray[np.float64]
 
 UR5_REACH = [1.46, -2.7, 1.45, 1.55, 2.1, -1.61], [2.5, 2.36, 0.25, -0.95, 2.2, 1.59], 3.89
 XARM_REACH = [0.3, -0.6, 0.5, 0.8, 0.2, 0.4, -0.3], [-0.9, 0.4, -0.8, 1.6, 1.2, 1.3, 1.5], 3.0
@@ -96,6 +100,14 @@ def test_a_later_grid_that_is_left_unfinished_refutes_an_estimate(
     assert found.error_estimate == pytest.approx(found.cost / lower.min() - 1, rel=1e-3)
 
 
+def planned_on_a_grid(robot: hovi.Robot, start: Array, goal: Array, T: float) -> hovi.Solution:
+    """A motion without limits, on given intervals."""
+    options: dict[str, Any] = {"limits": "none", "self_collision": False, "continuation": False}
+    grid: dict[str, Any] = {"intervals": 20, "scheme": "galerkin-4x10", "processes": 1}
+    scene = hovi.Scene(robot, [hovi.effects.Gravity()])
+    return hovi.plan(scene, start, goal, T, **options, **grid)
+
+
 @pytest.mark.parametrize("seed", [5, 8, 11, 15, 21, 31])
 @pytest.mark.parametrize("name", ["z1", "ur5", "xarm7"])
 def test_a_success_in_a_valley_is_one_on_intervals_of_a_quarter(name: str, seed: int) -> None:
@@ -104,18 +116,7 @@ def test_a_success_in_a_valley_is_one_on_intervals_of_a_quarter(name: str, seed:
     rng = np.random.default_rng(seed)
     start, goal = rng.uniform(-1.5, 1.5, (2, robot.nq))
     start, goal = (np.clip(q, 0.9 * robot.lower, 0.9 * robot.upper) for q in (start, goal))
-    found = hovi.plan(
-        hovi.Scene(robot, [hovi.effects.Gravity()]),
-        start,
-        goal,
-        3.0,
-        intervals=20,
-        scheme="galerkin-4x10",
-        limits="none",
-        processes=1,
-        self_collision=False,
-        continuation=False,
-    )
+    found = planned_on_a_grid(robot, start, goal, 3.0)
     if found.success:
         assert found.problem is not None
         quarters = found.problem.on(found.problem.grid.halved().halved())
@@ -149,18 +150,7 @@ def test_a_motion_that_still_finer_grids_refute_is_no_minimum() -> None:
     start, goal = (
         (low + high) / 2 + 0.6 * (high - low) / 2 * rng.uniform(-1, 1, robot.nq) for _ in range(2)
     )
-    found = hovi.plan(
-        hovi.Scene(robot, [hovi.effects.Gravity()]),
-        start,
-        goal,
-        2.0,
-        intervals=20,
-        scheme="galerkin-4x10",
-        limits="none",
-        processes=1,
-        self_collision=False,
-        continuation=False,
-    )
+    found = planned_on_a_grid(robot, start, goal, 2.0)
     assert found.status is hovi.Status.UNRESOLVED, found.message
     assert "rad/s a finer grid confirms it, but a still finer one does not" in found.message
     assert found.problem is not None

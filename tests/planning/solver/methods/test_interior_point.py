@@ -68,7 +68,7 @@ def test_the_least_cost_is_little_more_than_that_of_ipopt_at_the_points(
     ("name", "limits", "most_steps"),
     [
         ("two_link_reach", {"tau": [12.0, 4.0]}, 17),
-        ("two_link_reach", {"v": [3.0, 6.0], "tau": [14.0, 5.0]}, 28),
+        ("two_link_reach", {"v": [3.0, 6.0], "tau": [14.0, 5.0]}, 27),
         ("ur5_reach", UR5, 32),
         ("panda_reach", PANDA, 58),
     ],

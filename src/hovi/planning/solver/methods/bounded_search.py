@@ -72,6 +72,8 @@ EXACT_TOLERANCES = TORQUE_TOLERANCE, NODE_TOLERANCE
 """Residuals of equations at the end of a solve: see BoundedAction."""
 ROUGH_TOLERANCES = np.inf, 1e-4
 """The same for a rough solve."""
+LOOK_AROUND = 0.02
+"""Distance beyond the least one up to which pairs near a known motion get rows, in [m]."""
 
 
 @dataclass(eq=False)
@@ -85,8 +87,8 @@ class BoundedSearch:
         (2, N, kinds nv + pairs + values of conditions). clearance: bounded distances, or None.
     multipliers, unmet: of the constraints, and why they cannot be satisfied, or "".
     last: the problem and the motion of the last solve. solved: how it ended, and its objective.
-    points: of the central path, with a larger barrier than that of the last solution.
-    free_duration: whether the duration is free.
+    points: of the central path, with a larger barrier than that of the last solution. at_level:
+        whether a solve begins on one. free_duration: whether the duration is free.
     along, level: central path of a similar problem, if there is one on as many intervals, and the
         barrier parameter at which it is begun: see Start.
     lengths: of the free parts of the problem, in [s]; none where its times are given.
@@ -102,6 +104,7 @@ class BoundedSearch:
     multipliers: Multipliers | None = None
     unmet: str = ""
     lazy: bool = False
+    at_level: bool = False
     lengths: Array = dataclasses.field(default_factory=lambda: np.zeros(0))
 
     def __post_init__(self) -> None:
@@ -167,6 +170,11 @@ class BoundedSearch:
         assert self.problem.distances is not None
         return ClearanceRows(self.problem, self.problem.distances, self.bounded_distance)
 
+    def look_around(self, path: DiscretePath) -> None:
+        """Add rows for pairs that are near along a motion that nearly is a solution."""
+        if self.near is not None:
+            self.near.extend(self.problem, path, LOOK_AROUND)
+
     def objective(
         self,
         known: Multipliers | None,
@@ -185,7 +193,9 @@ class BoundedSearch:
         more = self.more
         if self.near is not None:
             common = self.problem, self.limits, self.margins, algebra, known, more
-            return ClearedAction(*common, self.rows, self.near)
+            cleared = ClearedAction(*common, self.rows, self.near)
+            cleared.radii = (BoundedAction if self.at_level else ClearedAction).radii
+            return cleared
         return BoundedAction(
             self.problem, self.limits, self.margins, algebra, known, more, self.rows
         )
@@ -260,7 +270,11 @@ class BoundedSearch:
 
         level: its barrier parameter, relative to the mean density of the objective.
         """
-        return self.solve(self.start_at(path, level, self.objective(self.multipliers), True))
+        self.at_level = True
+        try:
+            return self.solve(self.start_at(path, level, self.objective(self.multipliers), True))
+        finally:
+            self.at_level = False
 
     def start_at(
         self, path: DiscretePath, level: float, objective: BoundedAction, central: bool = False

@@ -14,13 +14,16 @@ from hovi.planning.solver.augmented_lagrangian_rounds import (
     first_multipliers,
     minimize_constrained,
 )
+from hovi.planning.solver.limits.limit_rows import LimitRows
 from hovi.planning.solver.methods.bounded_search import (
     ROUGH_TOLERANCES,
     Bounded,
     BoundedSearch,
 )
 from hovi.planning.solver.multipliers import Multipliers
+from hovi.planning.solver.near.clearance_rows import ClearanceRows
 from hovi.planning.solver.near.push_out import pushed_out
+from hovi.system.dataclass import dataclass
 from hovi.system.deadline import raise_if_late
 
 AHEAD = 0.06
@@ -35,23 +38,27 @@ ROUGH_VIOLATION = 0.05
 """Largest violation of a bound, relative to its range, from which a rough motion is solved on."""
 ROUGH_ROUNDS = 3
 """Rounds of an augmented Lagrangian for a rough motion."""
+DETOUR = 1.05
+"""Cost of a rough motion, relative to that of one without distances, above which it is one."""
 
 
 def cleared_motion(search: BoundedSearch, guess: DiscretePath) -> Bounded:
     """A motion within limits that keeps its distances, from a guess that may keep neither.
 
     It is solved without distances, until it can be seen whether it keeps them. If it does not, it
-    is moved out of the obstacles, and a rough motion from there is solved to its end; where there
-    is no such rough motion, the guess is moved out instead.
+    is moved out of the obstacles, and so is the guess if that takes a detour. The better rough
+    motion, by bounds and then by cost, is solved to its end.
     """
     assert search.near is not None
     free = _without_distances(search, guess)
     if not search.near.blocked and free.why is not Reason.DIVERGED:
         return free
-    for path in (free.x, guess):
-        found = _moved_out(search, path)
-        if found is not None:
-            return found
+    rough = [_rough_with_distances(search, free.x)]
+    if rough[0] is None or rough[0].rank > (False, DETOUR * abs(free.outputs.value)):
+        rough.append(_rough_with_distances(search, guess))
+    best = min(filter(None, rough), key=lambda each: each.rank, default=None)
+    if best is not None:
+        return best.solved(search)
     raise_if_late()  # or more time might lead to one
     return dataclasses.replace(free, why=Reason.DIVERGED)
 
@@ -83,11 +90,34 @@ def _rough_with_constraints(search: BoundedSearch, guess: DiscretePath) -> Bound
     return minimize_constrained(problem, guess, minimize_round, most=ROUGH_ROUNDS)[0]
 
 
-def _moved_out(search: BoundedSearch, path: DiscretePath) -> Bounded | None:
-    """The solution from a path that is moved out of obstacles; None without a rough motion.
+@dataclass(frozen=True, eq=False)
+class _Rough:
+    """A rough motion with distances, its rows, and multipliers of constraints, if there are any."""
 
-    A rough motion from there shows which pairs stay near: these alone keep their rows.
-    """
+    ended: Bounded
+    multipliers: Multipliers | None
+    rows: LimitRows
+    near: ClearanceRows
+
+    @property
+    def rank(self) -> tuple[bool, float]:
+        """Whether it does not keep its bounds yet, and the action."""
+        return not self.ended.feasible, self.ended.outputs.value
+
+    def solved(self, search: BoundedSearch) -> Bounded:
+        """The solve from there to the end, with rows of pairs that are near."""
+        x, barrier = self.ended.x, self.ended.z
+        near, kept = self.near.thinned(x, KEPT)
+        points = len(barrier.s) - len(self.near.order)
+        search.rows, search.near = self.rows, near
+        search.multipliers = self.multipliers
+        if self.ended.why in STOPPED:
+            return search.solve(Start(x))
+        return search.solve(Start(x, barrier.of(np.append(np.arange(points), points + kept))))
+
+
+def _rough_with_distances(search: BoundedSearch, path: DiscretePath) -> _Rough | None:
+    """A rough motion near a path that is moved out of obstacles; None if there is none."""
     problem, distances = search.problem, search.problem.distances
     assert distances is not None
     search.rows, search.near = search.coarse_rows(), search.no_near_rows()
@@ -95,20 +125,15 @@ def _moved_out(search: BoundedSearch, path: DiscretePath) -> Bounded | None:
     if moved is None:
         return None
     search.near.extend(problem, moved, AHEAD)
+    search.near.watchful = True
     known = first_multipliers(problem, moved) if problem.constrained else None
-    rough, known = _rough(search, moved, known, FIRST_MU)
-    x, barrier = rough.x, rough.z
-    if rough.why is Reason.DIVERGED or rough.violation > ROUGH_VIOLATION:
+    ended, known = _rough(search, moved, known, FIRST_MU)
+    if ended.why is Reason.DIVERGED or ended.violation > ROUGH_VIOLATION:
         return None
     if known is not None and len(problem.passive) > 0:
-        residuals = ActionObjective(problem, multipliers=known).residuals(x)
+        residuals = ActionObjective(problem, multipliers=known).residuals(ended.x)
         known = known.updated(residuals, problem.passive)
-    search.multipliers = known
-    points = len(barrier.s) - len(search.near.order)
-    search.near, kept = search.near.thinned(x, KEPT)
-    if rough.why in STOPPED:
-        return search.solve(Start(x))
-    return search.solve(Start(x, barrier.of(np.append(np.arange(points), points + kept))))
+    return _Rough(ended, known, search.rows, search.near)
 
 
 def _rough(

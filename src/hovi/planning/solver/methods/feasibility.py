@@ -158,6 +158,7 @@ def _solved_from_level(search: BoundedSearch, along: CentralPath, level: float) 
     path = search.problem.moved(point)
     if along.rows is None:
         search.rows.refine(path, fraction)
+    search.look_around(path)
     return search.solve_at_level(path, fraction)
 
 
@@ -167,5 +168,6 @@ def solved_from(search: BoundedSearch, path: DiscretePath) -> Bounded:
     Parts are halved first, as far as this barrier asks for: the motion may exceed coarser control
     points.
     """
+    search.look_around(path)
     search.rows.refine(path, NEARBY_MU)
     return search.solve(search.start_at(path, NEARBY_MU, search.objective(search.multipliers)))

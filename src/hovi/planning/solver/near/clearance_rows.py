@@ -39,10 +39,13 @@ Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]
 Mask = npt.NDArray[np.bool_]
 
-ROUNDING = 2e-5
-"""Size by which the shapes of rows are rounded, in [m]: see Distances.values."""
+ROUNDED_FRACTION, LEAST_ROUNDING, MOST_ROUNDING = 0.1, 2e-5, 1e-3
+"""Size by which the shapes of a row are rounded, as a fraction of what the row is above its bound,
+and the least and the largest, in [m]: see Distances.values."""
+SHARPENED = 0.5
+"""Ratio of such a size to the present one below which it takes its place."""
 MOST_INFLATION = 10.0
-"""Bound of what a rounded distance is shorter by, relative to that size."""
+"""Bound of what a rounded distance is shorter by, relative to the size."""
 WEIGHT = 0.1
 """Weight of a row in a barrier, as a fraction of the interval."""
 GUARD = 0.05
@@ -55,24 +58,25 @@ class ClearanceRows:
     They are as `ClearanceOutputs` measures them. None at first; `extend` adds some.
 
     problem: with the grid and the ends. distances: of all pairs. least: lower bound, in [m].
-    intervals, positions, pairs: of each row, shape (E,): its interval, where it is in it, from 0 to
-        1, and the number of its pair.
+    intervals, positions, pairs, rounding: of each row, shape (E,): its interval, where it is in it,
+        from 0 to 1, the number of its pair, and the size by which its shapes are rounded, in [m].
     order: see `stand_behind`.
     fixed: whether rows stay as they are. guard: distance beyond the least one below which `follow`
-        adds rows, in [m]. probing, blocked: see `extend`.
+        adds rows, in [m]. probing, blocked: see `extend`. watchful: whether pairs are followed even
+        before there are any rows.
     """
 
     def __init__(self, problem: TrajectoryProblem, distances: Distances, least: float) -> None:
         self.distances, self.least = distances, least
         self.fixed, self.guard = False, GUARD
-        self.probing = self.blocked = False
+        self.probing = self.blocked = self.watchful = False
         self.order: Index = np.zeros(0, dtype=np.intp)
         self._followed: LimitRows | None = None
         self._problem, self._spread = problem, RecentPaths[Array]()
         self.grid, self._spread_batch = problem.grid, spread(problem, SPREAD)
         self._measured, self._normals = RecentPaths[Array](), np.zeros((0, 3))
         none = np.zeros(0, dtype=np.intp)
-        self._set(problem, none, np.zeros(0), none)
+        self._set(problem, none, np.zeros(0), none, np.zeros(0))
 
     def copied(self, fixed: bool = False) -> ClearanceRows:
         """The same rows, to be extended on their own, or not at all."""
@@ -87,7 +91,7 @@ class ClearanceRows:
         """
         rows = copy.copy(self)
         rows._followed = behind
-        rows._set(problem, self.intervals, self.positions, self.pairs)
+        rows._set(problem, self.intervals, self.positions, self.pairs, self.rounding)
         rows._normals = self._normals.copy()
         return rows
 
@@ -95,6 +99,11 @@ class ClearanceRows:
     def size(self) -> int:
         """E, the number of rows."""
         return len(self.pairs)
+
+    @property
+    def watched(self) -> bool:
+        """Whether steps follow pairs, and are refused where they take one too deep."""
+        return self.watchful or self.size > 0
 
     @property
     def weights(self) -> Array:
@@ -128,7 +137,7 @@ class ClearanceRows:
         place = (np.cumsum(used) - 1)[instant]
         wanted = np.zeros((int(place.max()) + 1, self._wanted.shape[1]), dtype=bool)
         wanted[place, column] = True
-        q, sizes = self._configurations(path, times)[used], np.full(wanted.shape, ROUNDING)
+        q, sizes = self._configurations(path, times)[used], self._sizes[used]
         normals = np.zeros((*wanted.shape, 3))
         normals[place, column] = self._normals[chosen]
         d = self._some.values(q, self._reach, wanted, sizes, normals)
@@ -145,7 +154,7 @@ class ClearanceRows:
         weights[self._instant, self._column] = force * slope / DISTANCE_SCALE
         normals = np.zeros((*weights.shape, 3))
         normals[self._instant, self._column] = self._normals
-        given = self._reach, self._wanted, np.full(weights.shape, ROUNDING), normals
+        given = self._reach, self._wanted, self._sizes, normals
         found = self._some.expansion(q, weights, *given)
         self._normals[:] = normals[self._instant, self._column]
         J = found[1][self._instant, self._column] / DISTANCE_SCALE
@@ -204,6 +213,19 @@ class ClearanceRows:
         self.probing = False
         return self._add(problem, path, found)
 
+    def sharpen(self, path: DiscretePath) -> bool:
+        """Round shapes less in rows that have come nearer to their bounds; whether there are any.
+
+        Their outputs grow by that. Rounder shapes bend the motion less where it is far, so that
+        steps may be longer; at a bound they are nearly as they are.
+        """
+        size = _rounding_of(self.values(path))
+        sharper = size < SHARPENED * self.rounding
+        if not sharper.any():
+            return False
+        self._round(np.where(sharper, size, self.rounding))
+        return True
+
     def thinned(self, path: DiscretePath, within: float) -> tuple[ClearanceRows, Index]:
         """The rows of pairs that are near along a motion alone; others get rows later from now on.
 
@@ -213,7 +235,7 @@ class ClearanceRows:
         kept = self.values(path) <= within / DISTANCE_SCALE
         rows = copy.copy(self)
         rows._followed, rows.guard, rows._spread = None, 0.5 * within, RecentPaths()
-        some = self.intervals[kept], self.positions[kept], self.pairs[kept]
+        some = self.intervals[kept], self.positions[kept], self.pairs[kept], self.rounding[kept]
         rows._set(self._problem, *some)
         rows._normals = self._normals[kept]
         limits = len(self.order) - self.size
@@ -221,15 +243,15 @@ class ClearanceRows:
         slots[self.order] = np.arange(len(self.order))
         return rows, np.append(slots[:limits], slots[limits:][kept])
 
-    def hidden_depth(self, path: DiscretePath) -> float:
-        """How much too close pairs come where they have no rows, in [m]; negative if they do not.
+    def depth(self, path: DiscretePath) -> float:
+        """How much too close pairs come, in [m]; negative if they do not.
 
         At the positions that near pairs have rows at.
         """
         if self.fixed:
             return -np.inf
-        hidden = np.where(self._watched, self.least - self._spread_distances(path), -np.inf)
-        return float(hidden.max(initial=-np.inf))
+        d = self._spread_distances(path)
+        return float((self.least - d[free_ones(self._problem, len(d))]).max(initial=-np.inf))
 
     def follow(self, path: DiscretePath) -> int:
         """Add rows where pairs without rows have come near; returns how many."""
@@ -258,11 +280,15 @@ class ClearanceRows:
         both = (self.intervals, k), (self.positions, found.at - k), (self.pairs, found.pairs)
         intervals, positions, pairs = (np.concatenate(each) for each in both)
         added = len(found.pairs)
+        rounding = np.append(self.rounding, np.full(added, LEAST_ROUNDING))
         before = self._measured if problem is self._problem else RecentPaths[Array]()
         normals = np.concatenate([self._normals, np.zeros((added, 3))])
-        self._set(problem, intervals, positions, pairs)
+        self._set(problem, intervals, positions, pairs, rounding)
         self._measured = before.mapped(lambda known: np.append(known, np.full(added, np.nan)))
         self._normals = normals
+        rounding = rounding.copy()
+        rounding[-added:] = _rounding_of(self.values(path)[-added:])
+        self._round(rounding)
         self.order = np.append(self.order, len(self.order) + np.arange(added))
         return added
 
@@ -272,8 +298,9 @@ class ClearanceRows:
         intervals: Index,
         positions: Array,
         pairs: Index,
+        rounding: Array,
     ) -> None:
-        """Take rows: their intervals, positions in these, and numbers of pairs, (E,)."""
+        """Take rows: their intervals, positions in these, numbers of pairs, and rounding, (E,)."""
         if problem is not self._problem:
             self._spread = RecentPaths()
         if problem.grid is not self.grid:
@@ -287,12 +314,24 @@ class ClearanceRows:
         self._some = self.distances.restricted(chosen.tolist())
         self._wanted = np.zeros((len(at), len(chosen)), dtype=bool)
         self._wanted[self._instant, self._column] = True
+        self._take_rounding(rounding)
         self._sums = RowSums.of(at.real.astype(np.intp), self._instant)
         number = problem.grid.intervals * SPREAD + 1
         self._watched = np.tile(free_ones(problem, number)[:, None], (1, len(self.distances.pairs)))
         self._watched[np.rint((intervals + positions) * SPREAD).astype(np.intp), pairs] = False
         k, s = at.real.astype(np.intp), np.ascontiguousarray(at.imag)
         self._batch = InstantBatch(self.grid, k, s, np.ones(len(k)))
+
+    def _round(self, rounding: Array) -> None:
+        """Round the shapes of rows by other sizes, (E,), in [m]; these rows are measured again."""
+        changed = rounding != self.rounding
+        self._measured = self._measured.mapped(lambda known: np.where(changed, np.nan, known))
+        self._take_rounding(rounding)
+
+    def _take_rounding(self, rounding: Array) -> None:
+        self.rounding = rounding
+        self._sizes = np.zeros(self._wanted.shape)
+        self._sizes[self._instant, self._column] = rounding
 
     def _configurations(self, path: DiscretePath, times: Array | None = None) -> Array:
         """q at the instants, as distances take it. times: of obstacles, instead of their own."""
@@ -302,4 +341,9 @@ class ClearanceRows:
     @property
     def _reach(self) -> float:
         """Distance beyond which a row is constant, in [m]."""
-        return self.least + CUTOFF[1] * DISTANCE_SCALE + MOST_INFLATION * ROUNDING
+        return self.least + CUTOFF[1] * DISTANCE_SCALE + MOST_INFLATION * MOST_ROUNDING
+
+
+def _rounding_of(y: Array) -> Array:
+    """Sizes by which the shapes of rows are rounded, in [m]. y: of the rows, (E,)."""
+    return np.clip(ROUNDED_FRACTION * DISTANCE_SCALE * y, LEAST_ROUNDING, MOST_ROUNDING)

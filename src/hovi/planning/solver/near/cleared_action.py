@@ -33,7 +33,7 @@ Index = npt.NDArray[np.intp]
 AHEAD = 0.5
 """Distance up to which pairs count as near, over DISTANCE_SCALE, per barrier parameter."""
 DEEPEST = 0.005
-"""Depth of a pair without a row in a trial of a step beyond which the step is refused, in [m]."""
+"""Depth of a pair beyond which a step that takes it deeper is refused, in [m]."""
 
 
 class ClearedAction(BoundedAction):
@@ -63,6 +63,7 @@ class ClearedAction(BoundedAction):
         self._limit_outputs = RecentPaths[Array]()
         super().__init__(problem, limits, margins, algebra, multipliers, more, rows)
         self._near: ExpandedRows | None = None
+        self._deepest = np.inf
 
     def _with_rows(self) -> None:
         super()._with_rows()
@@ -83,9 +84,9 @@ class ClearedAction(BoundedAction):
     def outputs(self, x: DiscretePath) -> Outputs:
         """See BoundedAction.outputs."""
         base = super().outputs(x)
-        if self.near.size == 0:
+        if not self.near.watched:
             return base
-        value = np.inf if self.near.hidden_depth(x) > DEEPEST else base.value
+        value = np.inf if self.near.depth(x) > self._deepest else base.value
         return Outputs(value, self.ordered(np.append(base.y, self.near.values(x))))
 
     def _bounded_outputs(self, x: DiscretePath, outputs: list[Array]) -> Array:
@@ -105,6 +106,8 @@ class ClearedAction(BoundedAction):
         self._near = None
         if self.near.size > 0:
             self._near = self.near.expanded(x, force, self.action.coordinates)
+        if self.near.watched:
+            self._deepest = max(DEEPEST, self.near.depth(x))
         return super().model(x, sigma, rho, multipliers)
 
     @property
@@ -166,9 +169,10 @@ class ClearedAction(BoundedAction):
         found = self.rows.refine(x, level)
         if found is not None:  # before anything that may run out of time
             self._limit_outputs = RecentPaths()
+        sharper = self.near.sharpen(x)
         added = self.near.extend(self.problem, x, AHEAD * level * DISTANCE_SCALE)
         self.blocked = self.near.blocked
-        if found is None and added == 0:
+        if found is None and added == 0 and not sharper:
             return None
         kept, origin = np.arange(before), np.zeros(0, dtype=np.intp)
         if found is not None:
@@ -176,13 +180,13 @@ class ClearedAction(BoundedAction):
         return self._renumbered(order, before, kept, origin, added)
 
     def refine_at_once(self, x: DiscretePath) -> Refinement | None:
-        """Bound the distances of pairs that have come near in a step."""
+        """Bound the distances of pairs that have come near in a step, and round shapes less."""
         assert self.rows is not None
-        if self.near.size == 0:
+        if not self.near.watched:
             return None
         order, before = self.near.order, self.rows.size
-        added = self.near.follow(x)
-        if added == 0:
+        sharper, added = self.near.sharpen(x), self.near.follow(x)
+        if added == 0 and not sharper:
             return None
         none = np.zeros(0, dtype=np.intp)
         return self._renumbered(order, before, np.arange(before), none, added)

@@ -52,7 +52,10 @@ PASSES = 4
 def pushed_out(
     problem: TrajectoryProblem, path: DiscretePath, distances: Distances, least: float
 ) -> DiscretePath | None:
-    """The path moved such that all distances are at least `least`, in [m]; None if that fails."""
+    """The path moved such that all distances are at least `least`, in [m]; None if that fails.
+
+    They may fall short of it by BEYOND: from there a solve finds out by itself.
+    """
     deformation = _Deformation(problem, path, distances, least)
     found = deformation.solved()
     return None if found is None else problem.path(deformation.curve(found))
@@ -68,7 +71,8 @@ class _Deformation:
     least: float
 
     def solved(self) -> Array | None:
-        """The coefficients of a change that keeps all distances; None if none is found."""
+        """The coefficients of a change that keeps all distances, or nearly; None for none."""
+        nearly = None
         c = np.zeros((self._number + sum(self._free), self.problem.coordinates.nv))
         aim = self.least + BEYOND
         for _ in range(MAX_ITERATIONS):
@@ -79,11 +83,13 @@ class _Deformation:
             lowest = d.min(axis=0)
             if float(lowest.min()) >= self.least:
                 return c
+            if float(lowest.min()) >= self.least - BEYOND:
+                nearly = c
             target = np.minimum(aim, np.where(lowest < self.least, lowest + STEP, aim))
             change = self._moved(c, d, J, target) - c
             largest = float(np.abs(self._values @ change).max())
             c = c + min(1.0, LONGEST / max(largest, 1e-300)) * change
-        return None
+        return nearly
 
     def _moved(self, c: Array, d: Array, J: Array, target: Array) -> Array:
         """The coefficients after one iteration. d, J: distances and their derivatives."""
