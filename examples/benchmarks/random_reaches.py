@@ -2,8 +2,9 @@
 
 Twenty pairs are drawn uniformly within the position limits of each robot, at most one turn, among
 those that can be held with less than the torque limits. The duration is three times that of the
-slowest joint at its velocity limit, at least one second. Where the direct solve finds no minimum,
-`plan` tries continuation; reaches that still fail are planned again from four guesses.
+slowest joint at its velocity limit, at least one second. Where the direct solve runs out of
+iterations, `plan` goes on from its motion; reaches that still fail are planned again from four
+guesses.
 
     python random_reaches.py [ROBOT ...]
 """

@@ -42,6 +42,10 @@ NOTICED = {
     ),
     "neighbours are halved, too": "limited reach bravo7_no_ee 2 of side_by_side.py",
     "halved intervals from the motion": "limited reach bravo7_no_ee 2 of side_by_side.py",
+    "several sides": "task xarm7_bin_to_bin",
+    "nearly moved out": "examples/benchmarks/tasks.py",
+    "fast joints evade": "task panda_out_of_bin",
+    "continuation": "test_masses_of_a_million_to_one_are_solved_by_more_steps",
     "continued at its iteration limit": "limited reach bravo7_no_ee 1 of side_by_side.py",
 }
 """What notices rules that change nothing on the corpus: a test that fails without, or a problem."""
@@ -308,7 +312,7 @@ _rule(
 )
 _rule(
     "end where stalled within limits",
-    "Twelve steps without progress end a solve as diverged.",
+    "Twelve refused steps end a solve as diverged.",
     "_Iteration._is_hopeless",
     "self.stalled >= MAX_STALLED_STEPS",
     "False",
@@ -557,6 +561,13 @@ _rule(
     "False",
 )
 _rule(
+    "close points among obstacles",
+    "Among obstacles a solve for other ends begins within 0.1 rad of the solution.",
+    "_solved_from_level",
+    "along.close(level, problem.coordinates) if other_ends else along.at(level)",
+    "along.at(level)",
+)
+_rule(
     "refine rows at a level",
     "On another grid control points are halved before the first step.",
     "_solved_from_level",
@@ -668,6 +679,28 @@ _rule(
     "self.near.thinned(x, KEPT)",
     "self.near.thinned(x, 1e9)",
 )
+_at("distances", "planning.solver.near.push_out")
+_rule(
+    "several sides",
+    "A motion that cannot be moved out of obstacles is tried from random bumps.",
+    "pushed_out",
+    "range(TRIES)",
+    "range(1)",
+)
+_rule(
+    "nearly moved out",
+    "Motions that stay too close by at most 5 mm count as moved out.",
+    "_Deformation.solved",
+    "float(lowest.min()) >= self.least - NEARLY",
+    "False",
+)
+_rule(
+    "fast joints evade",
+    "Changes of joints that are slow by their limits cost more.",
+    "_Deformation._stiffness",
+    "self._prices",
+    "np.ones(self.problem.coordinates.nv)",
+)
 _at("distances", "planning.solver.near.approaches")
 _rule(
     "rows around touches",
@@ -708,7 +741,7 @@ _rule(
 _at("distances", "planning.solver.near.cleared_action")
 _rule(
     "refuse depth",
-    "A step that takes a pair deeper than before, and too deep, is refused.",
+    "A step whose deepest pair is deeper than before, and more than 5 mm, is refused.",
     "ClearedAction.outputs",
     "self.near.depth(x) > self._deepest",
     "False",
@@ -1103,8 +1136,8 @@ _rule(
 _at("continuation", "planning.search.search")
 _rule(
     "continuation",
-    "A solve that ran out of iterations goes on from its motion.",
+    "A solve without a minimum goes on, or begins with more time among obstacles.",
     "Search._continued",
-    "not may_help(found[0])",
+    "not may_help(job, found[0])",
     "True",
 )

@@ -81,7 +81,7 @@ DENSITY_FLOOR = 1e-9
 MAX_FORCE = 1e12
 """Multiplier, relative to the mean density, above which the bounds are taken as impossible."""
 MAX_STALLED_STEPS = 12
-"""Consecutive steps without progress after which the iteration ends as diverged."""
+"""Consecutive refused steps after which the iteration ends as diverged."""
 MAX_UNMET = 4
 """Steps that predict next to nothing after which it ends although equations do not hold."""
 MAX_SADDLES = 5

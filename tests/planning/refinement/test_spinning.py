@@ -20,6 +20,12 @@ UR5_REACH = [1.46, -2.7, 1.45, 1.55, 2.1, -1.61], [2.5, 2.36, 0.25, -0.95, 2.2, 
 XARM_REACH = [0.3, -0.6, 0.5, 0.8, 0.2, 0.4, -0.3], [-0.9, 0.4, -0.8, 1.6, 1.2, 1.3, 1.5], 3.0
 
 
+def on_quarters(found: hovi.Solution) -> hovi.Solution:
+    """The solution from a motion on intervals of a quarter of its own."""
+    assert found.problem is not None
+    return solve_on_grid(found.problem.on(found.problem.grid.halved().halved()), found.trajectory)
+
+
 @pytest.fixture(scope="module")
 def xarm() -> hovi.Scene:
     return hovi.Scene(hovi.load_robot("xarm7"), [hovi.effects.Gravity()])
@@ -48,6 +54,7 @@ def test_each_remedy_helps(xarm: hovi.Scene) -> None:
     for scene, limits in ((xarm, "urdf"), (rotors, "none"), (smooth, "none")):
         found = hovi.plan(scene, *XARM_REACH, limits=limits, self_collision=False)
         assert found.success, found.message
+        assert not any("spins" in said for said in found.trajectory.cautions)
 
 
 def test_info_names_light_joints_beforehand(xarm: hovi.Scene) -> None:
@@ -68,12 +75,11 @@ def test_a_spinning_motion_that_a_finer_grid_leaves_is_no_minimum(
     found = hovi.plan(
         scene, start, goal, 1.23, limits="none", processes=1, tolerance=0.03, self_collision=False
     )
-    assert found.problem is not None
-    quarters = found.problem.on(found.problem.grid.halved().halved())
-    finer = solve_on_grid(quarters, found.trajectory)
+    finer = on_quarters(found)
     assert finer.success
     assert finer.cost < 0.99 * found.cost
     assert found.status is hovi.Status.UNRESOLVED
+    assert "rad/s" in found.message
 
 
 @pytest.fixture(scope="module")
@@ -118,9 +124,7 @@ def test_a_success_in_a_valley_is_one_on_intervals_of_a_quarter(name: str, seed:
     start, goal = (np.clip(q, 0.9 * robot.lower, 0.9 * robot.upper) for q in (start, goal))
     found = planned_on_a_grid(robot, start, goal, 3.0)
     if found.success:
-        assert found.problem is not None
-        quarters = found.problem.on(found.problem.grid.halved().halved())
-        finer = solve_on_grid(quarters, found.trajectory)
+        finer = on_quarters(found)
         assert finer.cost == pytest.approx(found.cost, rel=0.01)
 
 
@@ -134,11 +138,7 @@ def test_a_fast_spinning_motion_that_finer_grids_confirm_is_a_minimum() -> None:
     assert found.success, found.message
     motion = found.trajectory.sample(np.linspace(0.0, duration, 5_001))
     assert np.abs(motion.v).max() * duration > 8 * np.pi
-    assert found.problem is not None
-    quarters = solve_on_grid(
-        found.problem.on(found.problem.grid.halved().halved()), found.trajectory
-    )
-    assert quarters.cost == pytest.approx(found.cost, rel=1e-2)
+    assert on_quarters(found).cost == pytest.approx(found.cost, rel=1e-2)
     moved = found.replan(goal=np.add(goal, 2e-3))
     assert moved.error_estimate not in (found.error_estimate, 2 * (found.error_estimate or 0.0))
 
@@ -153,9 +153,7 @@ def test_a_motion_that_still_finer_grids_refute_is_no_minimum() -> None:
     found = planned_on_a_grid(robot, start, goal, 2.0)
     assert found.status is hovi.Status.UNRESOLVED, found.message
     assert "rad/s a finer grid confirms it, but a still finer one does not" in found.message
-    assert found.problem is not None
-    quarters = found.problem.on(found.problem.grid.halved().halved())
-    finer = solve_on_grid(quarters, found.trajectory)
+    finer = on_quarters(found)
     assert abs(finer.cost / found.cost - 1) > 1e-3
 
 
@@ -173,9 +171,7 @@ def test_a_motion_that_finer_grids_move_ever_further_is_no_minimum(
     )
     assert found.status is hovi.Status.UNRESOLVED, found.message
     assert "and a still finer one does not confirm that" in found.message
-    assert found.problem is not None
-    quarters = found.problem.on(found.problem.grid.halved().halved())
-    finer = solve_on_grid(quarters, found.trajectory)
+    finer = on_quarters(found)
     assert finer.success
     assert finer.cost < 0.99 * found.cost
     assert hovi.plan(scene, start, goal, 4.190286081291065, **options, self_collision=False).success

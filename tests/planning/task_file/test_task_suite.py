@@ -100,6 +100,14 @@ def test_the_least_clearance_is_that_of_all_samples(name: str) -> None:
     assert found == pytest.approx(least, abs=1e-9)
 
 
+@pytest.mark.parametrize("name", ["tiago_shelf_to_table", "four_axis_into_crate"])
+def test_a_way_past_obstacles_is_found(name: str) -> None:
+    """Through none of which a straight guess leads: from several sides, or with more time first."""
+    found = benchmark("tasks").planned(hovi.example(name), SHORT)
+    assert found["success"], found
+    assert found["clearance"] >= found["margin"] - 1e-6, found["pair"]
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("path", SUITE, ids=lambda path: path.stem)
 def test_a_minimum_keeps_its_margin_at_50000_times(path: Path) -> None:

@@ -136,8 +136,9 @@ def resolved(solution: Solution) -> Solution:
         most 1 %. The finer grid has two more modes per interval, of a Galerkin table for any
         scheme; under limits every interval is halved where that fails;
     (c) that solution was found;
-    (d) where without limits a light joint spins, or the finer solution is far away, a still finer
-        grid confirms the finer one: see `fault_of_valley`;
+    (d) where without limits a light joint spins, or the finer solution is far away (among obstacles
+        only where a joint spins and the costs differ), a still finer grid confirms the finer one:
+        see `fault_of_valley`;
     (e) no effect has features between the points that change the cost by more: see `features_of`;
     (f) it is usable: see `judged`.
     Solutions of another status are returned unchanged. If the deadline in force passes before

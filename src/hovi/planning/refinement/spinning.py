@@ -103,7 +103,8 @@ def fault_of_valley(
     Where a joint spins, or the finer solution is FAR away and the costs are not CLOSE, the two may
     be different motions along a valley without a minimum, whose costs say little about the error.
     Then a still finer grid, of intervals of half the length, has to confirm the finer one: by a
-    CLOSE cost where a joint spins, else by a solution much nearer to it.
+    CLOSE cost where a joint spins, else by a solution much nearer to it. Among obstacles that is
+    asked for only where a joint spins and the costs are not CLOSE.
     error: relative error of the cost; None if the cost is only rounding. finer: the finer solution
         that it was compared with; None to compute it.
     """
@@ -112,9 +113,8 @@ def fault_of_valley(
     spinning = spin_without_limits(solution)
     if problem.has_limits or error is None:
         return ""
-    if problem.limited and (spinning is None or error <= CLOSE):
-        return ""
-    if spinning is None and error <= CLOSE:
+    doubts = spinning is not None, error > CLOSE
+    if not (all(doubts) if problem.limited else any(doubts)):
         return ""
     where = "" if spinning is None else f"at {spinning.speed:.3g} rad/s "
     try:

@@ -1,9 +1,21 @@
-"""Automatic continuation: a solve that ran out of iterations goes on from its motion."""
+"""Automatic continuation: more steps, or from motions that may take longer.
+
+A solve that ran out of iterations goes on from its motion. Where limits leave no way past the
+obstacles from a guess, the motion is found for a longer duration first, which is then shortened.
+"""
 
 from __future__ import annotations
 
 import dataclasses
+from typing import TypeVar
 
+import numpy as np
+
+from hovi.discrete.grid import Grid
+from hovi.discrete.state import State
+from hovi.errors import HoviError
+from hovi.planning.problem.frame_goal import FrameGoal
+from hovi.planning.problem.limits import Limits
 from hovi.planning.search.job import Job
 from hovi.planning.solver.solver import Solution, solve_on_grid
 from hovi.planning.solver.status import Status
@@ -11,17 +23,30 @@ from hovi.system.deadline import Deadline
 from hovi.system.interruption import record_interrupt
 from hovi.system.progress import Progress
 
+MORE_STEPS = "more steps from the last motion"
+"""What is tried after an iteration limit."""
 MAX_SOLVES = 12
-"""Maximum number of solves, each of the job's number of iterations."""
+"""Maximum number of solves that go on, each of the job's number of iterations."""
+LONGER = 2.0, 1.5, 1.25, 1.1
+"""Durations before the given one, relative to it."""
+Goal = TypeVar("Goal", State, State | FrameGoal)
 STOPPED = Status.TIME_LIMIT, Status.INTERRUPTED
 """Statuses that end a search."""
 UNUSABLE = Status.DIVERGED, Status.INFEASIBLE
 """Statuses without a useful motion."""
 
 
-def may_help(solution: Solution) -> bool:
-    """Whether a direct solve ran out of iterations, so that more steps may find a minimum."""
-    return solution.status is Status.ITERATION_LIMIT and solution.nit > 0
+def may_help(job: Job, failed: Solution) -> bool:
+    """Whether a direct solve ended such that more steps, or a longer duration, may help."""
+    if failed.nit == 0:
+        return False
+    return failed.status is Status.ITERATION_LIMIT or _needs_time(job, failed)
+
+
+def _needs_time(job: Job, failed: Solution) -> bool:
+    """Whether no motion was found among obstacles, or clear of links, within limits."""
+    limited = bool(job.limits.bounded[1:].any())
+    return failed.status in UNUSABLE and job.options.clearance.wanted and limited
 
 
 def solve_by_continuation(
@@ -30,35 +55,69 @@ def solve_by_continuation(
     deadline: Deadline | None = None,
     progress: Progress | None = None,
 ) -> Solution:
-    """A minimum that the direct solve did not reach, or the best motion by more steps from it.
+    """A minimum that the direct solve did not reach, or the best motion found on the way.
 
-    failed: the direct solve, at its iteration limit. deadline: of all solves together; none if
-    None. progress: called before each. The message says how it went; nit counts the steps of the
-    last solve only.
+    failed: the direct solve. deadline: of all solves together; none if None. progress: called
+    before each. The message says how it went; nit counts the steps of the last solve only.
     """
-    deadline, last, best, steps = deadline or Deadline(), failed, failed, 0
+    deadline, best, last, steps = deadline or Deadline(), failed, failed, 0
+    longer = _needs_time(job, failed)
+    guess = job.options.guess if longer else failed.trajectory
     try:
-        for i in range(MAX_SOLVES):
+        stages = [*(_lasting(job, each) for each in LONGER), job] if longer else [job] * MAX_SOLVES
+        for i, stage in enumerate(stages):
             if progress is not None:
-                progress("continuation: more steps from the last motion", i / MAX_SOLVES)
+                text = f"a duration of {stage.grid.duration:.4g} s" if longer else MORE_STEPS
+                progress(f"continuation: {text}", i / len(stages))
             last = solve_on_grid(
-                job.problem(),
-                last.trajectory,
+                stage.problem(),
+                guess,
                 max_iterations=job.options.max_iterations,
                 time_limit=deadline.seconds_left,
-                barrier=job.barrier,
+                barrier=stage.barrier,
             )
-            steps += last.nit
-            if last.success or (last.status not in UNUSABLE and last.cost < best.cost):
+            steps, guess = steps + last.nit, last.trajectory
+            if stage is job and (last.success or _is_better(last, best)):
                 best = last
-            if last.status is not Status.ITERATION_LIMIT:
+            done = stage is job and last.status is not Status.ITERATION_LIMIT
+            if done or last.status in (*STOPPED, *UNUSABLE):
                 break
         if last.status in STOPPED:
             best = dataclasses.replace(best, status=last.status)
     except KeyboardInterrupt:
         record_interrupt()
         best = dataclasses.replace(best, status=Status.INTERRUPTED)
+    except HoviError:  # effects or conditions that do not allow a longer duration
+        pass
     return _with_sentence(best, failed, steps)
+
+
+def _is_better(found: Solution, best: Solution) -> bool:
+    """Whether a motion that is no minimum is the better one of two."""
+    if found.status in UNUSABLE:
+        return False
+    return best.status in UNUSABLE or found.cost < best.cost
+
+
+def _lasting(job: Job, factor: float) -> Job:
+    """The job with its duration times `factor`, and velocities of its ends in proportion."""
+    grid = Grid(factor * job.grid.steps, job.grid.schemes)
+    via = tuple(
+        dataclasses.replace(each, time=factor * each.time, goal=_slower(each.goal, factor))
+        for each in job.via
+    )
+    if job.limits.parts:
+        ends = [factor * end for end in job.limits.ends]
+        job = job.with_options(limits=Limits.of_segments(job.limits.parts, ends))
+    start, goal = _slower(job.start, factor), _slower(job.goal, factor)
+    return dataclasses.replace(job.with_options(via=via), grid=grid, start=start, goal=goal)
+
+
+def _slower(goal: Goal, factor: float) -> Goal:
+    """A state with its velocity divided by `factor`; goals of frames are unchanged."""
+    if not isinstance(goal, State) or goal.v is None:
+        return goal
+    return dataclasses.replace(goal, v=np.asarray(goal.v) / factor)
 
 
 def how_ended(status: Status) -> str:

@@ -212,7 +212,8 @@ class PlanOptions:
     )
     continuation: bool = option(
         True,
-        "if no start ends in a minimum and one ran out of iterations, go on from its motion; the "
+        "if no start ends in a minimum and the best one ran out of iterations, go on from its "
+        "motion; if none found a way past obstacles within limits, begin with more time. The "
         "message says so.",
         SceneKey("true or false"),
     )

@@ -322,11 +322,11 @@ class Search:
         return dataclasses.replace(found, branches=tuple(branches), isolated=job.isolated)
 
     def _continued(self, job: Job, found: list[Solution]) -> list[Solution]:
-        """The solutions, or what continuation makes of the best where that ran out of steps."""
+        """The solutions, or what continuation makes of the best where that found no minimum."""
         options = self.fine.options
         if interrupted() or self.deadline.passed or not options.continuation:
             return found
-        if not may_help(found[0]):
+        if not may_help(job, found[0]):
             return found
         return [solve_by_continuation(job, found[0], self.deadline, self.progress)]
 

@@ -14,10 +14,15 @@ from hovi.optimize.barrier import Barrier
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.limits.limit_rows import LimitRows
 from hovi.planning.solver.near.clearance_rows import ClearanceRows
+from hovi.robot.space.coordinates import Coordinates
 from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
-Mask = npt.NDArray[np.bool_]
+
+FARTHEST = 0.1
+"""Largest change of q from a point of a central path to its solution, in [rad] or [m], with which a
+solve for other ends begins at the point among obstacles: it may be on the way to another minimum.
+"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +67,18 @@ class CentralPath:
         """The last point whose parameter is at least a level; the first if there is none."""
         large = [point for point in self.points if point[0] >= level]
         return large[-1] if large else self.points[0]
+
+    def close(self, level: float, on: Coordinates) -> tuple[float, DiscretePath]:
+        """As `at`, or the next point that is no farther than FARTHEST from the solution.
+
+        on: the coordinates of the paths.
+        """
+        first = self.at(level)
+        for point in self.points:
+            apart = np.abs(on.difference(point[1].q, self.last.q)).max()
+            if point[0] <= first[0] and apart <= FARTHEST:
+                return point
+        return self.points[-1]
 
     def ending_at(self, path: DiscretePath) -> CentralPath:
         """The same with another last path, on the same grid."""

@@ -154,8 +154,9 @@ def _solved_warm(search: BoundedSearch, known: Barrier, path: DiscretePath) -> B
 
 def _solved_from_level(search: BoundedSearch, along: CentralPath, level: float) -> Bounded:
     """Solve from the point of a central path with a barrier as large as a level."""
-    fraction, point = along.at(level)
-    path = search.problem.moved(point)
+    problem, other_ends = search.problem, search.near is not None and search.level is None
+    fraction, point = along.close(level, problem.coordinates) if other_ends else along.at(level)
+    path = problem.moved(point)
     if along.rows is None:
         search.rows.refine(path, fraction)
     search.look_around(path)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from functools import partial
 
 import numpy as np
@@ -112,8 +111,8 @@ def _searched(search: BoundedSearch) -> Answer:
     history, central = search.history, None
     if status is Status.MINIMUM:
         central = search.central_path(ended)
-    found = Answer(problem, x, value, status, message, nit, n_neg, history, forces, instants)
-    return dataclasses.replace(found, central=central)
+    counted = value, status, message, nit, n_neg, history
+    return Answer(problem, x, *counted, forces, instants, central=central)
 
 
 def _ended(search: BoundedSearch, why: Reason) -> Answer:

@@ -22,7 +22,6 @@ from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
-Index = npt.NDArray[np.intp]
 Mask = npt.NDArray[np.bool_]
 
 WAVES, MOST_WAVES = 12, 60
@@ -45,6 +44,13 @@ CONDITION_STIFFNESS = 1e8
 """The same for conditions at nodes."""
 LONGEST = 0.2
 """Largest change of a coordinate in one iteration, in [rad] or [m]."""
+TRIES = 9
+"""Number of changes to begin with: none, and then random ones, which may lead past an obstacle on
+another side."""
+BUMPS, BUMP = 3, 0.7
+"""Number of waves of a random change, and the size of the first one, in [rad] or [m]."""
+NEARLY = 0.005
+"""How much shorter than the least one distances may be in the end, in [m]."""
 PASSES = 4
 """Passes in which the pairs that an iteration would move too close are found."""
 
@@ -54,11 +60,14 @@ def pushed_out(
 ) -> DiscretePath | None:
     """The path moved such that all distances are at least `least`, in [m]; None if that fails.
 
-    They may fall short of it by BEYOND: from there a solve finds out by itself.
+    Where they stay shorter by at most NEARLY, that will do: a solve from there does the rest.
     """
     deformation = _Deformation(problem, path, distances, least)
-    found = deformation.solved()
-    return None if found is None else problem.path(deformation.curve(found))
+    for seed in range(TRIES):
+        found = deformation.solved(deformation.bumps(seed))
+        if found is not None:
+            return problem.path(deformation.curve(found))
+    return None
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,10 +79,21 @@ class _Deformation:
     distances: Distances
     least: float
 
-    def solved(self) -> Array | None:
-        """The coefficients of a change that keeps all distances, or nearly; None for none."""
-        nearly = None
+    def bumps(self, seed: int) -> Array:
+        """The coefficients with which a try begins: none, and then random ones."""
         c = np.zeros((self._number + sum(self._free), self.problem.coordinates.nv))
+        if seed > 0:
+            sizes = BUMP / np.arange(1, BUMPS + 1)[:, None] / np.sqrt(self._prices)
+            first = sum(self._free)
+            c[first : first + BUMPS] = np.random.default_rng(seed).normal(0.0, sizes)
+        return c
+
+    def solved(self, c: Array) -> Array | None:
+        """The coefficients of a change that keeps all distances, or nearly; None for none.
+
+        c: those it begins with.
+        """
+        nearly = None
         aim = self.least + BEYOND
         for _ in range(MAX_ITERATIONS):
             q = self.problem.coordinates.integrate(self._q, self._values @ c)
@@ -83,7 +103,7 @@ class _Deformation:
             lowest = d.min(axis=0)
             if float(lowest.min()) >= self.least:
                 return c
-            if float(lowest.min()) >= self.least - BEYOND:
+            if float(lowest.min()) >= self.least - NEARLY:
                 nearly = c
             target = np.minimum(aim, np.where(lowest < self.least, lowest + STEP, aim))
             change = self._moved(c, d, J, target) - c
@@ -176,13 +196,24 @@ class _Deformation:
         return self.waves(self._t / self._t[-1])[0]
 
     @cached_property
+    def _prices(self) -> Array:
+        """Prices of changes of the coordinates, (nv,): what is slow by its limits costs more."""
+        limits = self.problem.limits
+        prices = np.ones(self.problem.coordinates.nv)
+        if limits is not None:
+            speed = np.minimum(limits.upper[1], -limits.lower[1])
+            known = np.isfinite(speed) & (speed > 0.0)
+            prices[known] = (speed[known].max(initial=0.0) / speed[known]) ** 2
+        return prices
+
+    @cached_property
     def _stiffness(self) -> Array:
         """The matrix of the integral of 1/2 |x''|^2 in normalized time."""
         x, weights = np.polynomial.legendre.leggauss(2 * self._number + 8)
         ddw = self.waves((x + 1) / 2)[2]
         gram = ddw.T @ (0.5 * weights[:, None] * ddw)
         gram += RIDGE * np.eye(len(gram))  # both ends may move without an acceleration
-        H = np.kron(gram, np.eye(self.problem.coordinates.nv))
+        H = np.kron(gram, np.diag(self._prices))
         T = self.problem.grid.duration
         for each in self.problem.holds:  # what is given at seams does not change
             for x, fixed in zip(self.waves(np.array([each.time / T])), each.fixed, strict=False):
