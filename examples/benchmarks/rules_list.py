@@ -45,6 +45,7 @@ NOTICED = {
     "several sides": "task xarm7_bin_to_bin",
     "nearly moved out": "examples/benchmarks/tasks.py",
     "fast joints evade": "task panda_out_of_bin",
+    "infeasible on halved intervals": "test_smooth_motions_with_an_acceleration_limit",
     "continuation": "test_masses_of_a_million_to_one_are_solved_by_more_steps",
     "continued at its iteration limit": "limited reach bravo7_no_ee 1 of side_by_side.py",
 }
@@ -1033,9 +1034,17 @@ _rule(
 _rule(
     "nodes where joints speed up",
     "Where a duration seems too short, nodes are put where joints speed up and slow down.",
-    "Search._run",
-    "self._with_ramps(explored)",
-    "None",
+    "Search._on_finer_grid",
+    "graded_to_ramps(fine.problem())",
+    "fine.grid",
+    False,
+)
+_rule(
+    "infeasible on halved intervals",
+    "What is infeasible on a grid that hovi chose is tried once more on halved intervals.",
+    "Search._on_finer_grid",
+    "self.halved or fine.tolerance is None or fine.options.clearance.wanted",
+    "True",
 )
 _rule(
     "finer tolerances where unresolved",

@@ -176,11 +176,10 @@ def test_smooth_motions_near_the_least_time_of_a_velocity(seed: int, tmp_path: P
     assert solution.success, solution.message
 
 
-@pytest.mark.xfail(strict=True, reason="1.0021 to 1.01: a convex problem is called infeasible")
 def test_smooth_motions_with_an_acceleration_limit(tmp_path: Path) -> None:
     scene, way, V, A = sliders(tmp_path, 1), 1.3, 1.0, 4.0
 
     def plan(T: float) -> hovi.Solution:
         return hovi.plan(scene, [0.0], [way], T, limits={"v": [V], "a": [A]}, smooth=True)
 
-    assert abs(edge(plan, least_time(way, 0, 0, V, A), WITH_FORCE) - 1) <= WITH_FORCE
+    assert abs(edge(plan, least_time(way, 0, 0, V, A), WITH_FORCE) - 1) <= WITH_FORCE + 1e-12

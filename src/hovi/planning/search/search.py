@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
@@ -59,6 +59,7 @@ class Search:
     fine: the requested job, with the guess among its options. deadline: of the whole search.
     without: the same without self-collision, which is searched first; None where there is none.
     free: bounds of a free duration; None for a given one. ends: as they were chosen from branches.
+    halved: whether the intervals of the job were halved, since it was infeasible before.
     """
 
     fine: Job
@@ -68,6 +69,7 @@ class Search:
     without: Job | None = None
     ends: Ends | None = None
     segments: FreeSegments | None = None
+    halved: bool = False
 
     def run(self) -> tuple[Solution, tuple[float, ...]]:
         """The best solution, and the costs of all minima on the requested grid.
@@ -130,8 +132,8 @@ class Search:
         explored = self._explored(job)
         if self._needs_more_points(explored):
             return dataclasses.replace(self, fine=with_more_points(self.fine))._run()
-        if (graded := self._with_ramps(explored)) is not None:
-            return dataclasses.replace(self, fine=graded)._run()
+        if (again := self._on_finer_grid(explored)) is not None:
+            return again._run()
         if self.free is None or explored.minima[0].success:
             return self._finished(job, explored)
         return self._from_another_duration(self.free, explored)
@@ -142,18 +144,23 @@ class Search:
         ended = found.success or found.status in STOPPED or interrupted()
         return has_few_points(self.fine) and not ended
 
-    def _with_ramps(self, explored: Exploration) -> Job | None:
-        """The job with nodes where joints that are pressed for time speed up and slow down.
+    def _on_finer_grid(self, explored: Exploration) -> Self | None:
+        """The search once more where it called its problem infeasible, as its grid may be coarse.
 
-        None if the motion on this grid is not infeasible, or if it has them. A grid that is given
-        gets them, too, since limits split its intervals in any case.
+        With nodes where joints that are pressed for time speed up and slow down, also on a grid
+        that is given, since limits split its intervals in any case; and then on halved intervals,
+        once, but not among obstacles, where the guess is to blame. None if neither is left.
         """
         fine, found = self.fine, explored.minima[0]
         infeasible = found.status is Status.INFEASIBLE and found.nit > 0  # not by a contradiction
         if not infeasible or self.free is not None or interrupted():
             return None
         grid = graded_to_ramps(fine.problem())
-        return None if grid.intervals == fine.grid.intervals else fine.on(grid)
+        if grid.intervals > fine.grid.intervals:
+            return dataclasses.replace(self, fine=fine.on(grid))
+        if self.halved or fine.tolerance is None or fine.options.clearance.wanted:
+            return None
+        return dataclasses.replace(self, fine=fine.on(fine.grid.halved()), halved=True)
 
     def _from_another_duration(
         self, free: FreeDuration, explored: Exploration
