@@ -355,6 +355,13 @@ _rule(
     False,
 )
 _rule(
+    "radius cut where outputs are added outside",
+    "Outputs that are added outside their bounds cut the radius to 3.",
+    "_Iteration._replaced",
+    "outside > 0.0",
+    "False",
+)
+_rule(
     "room for new outputs",
     "Outputs that are added outside their bounds raise mu and move other slacks inside.",
     "_Iteration._replaced",

@@ -778,6 +778,7 @@ def test_a_sequence_is_planned_saved_and_drawn(run: Run, tmp_path: Path) -> None
     assert [each["end"] for each in segments] == pytest.approx([0.6, 1.5, 2.3])
     assert sum(each["cost"] for each in segments) == pytest.approx(report["cost"], rel=1e-12)
     assert report["certificate"]["replay"] is not None
+    assert "segment 'carry' from 0.6 to 1.5 s" in run("info", tmp_path / "pick.npz")[1]
     assert run("plot", tmp_path / "pick.npz", "--out", tmp_path / "pick.png")[0] == 0
     assert run("replay", tmp_path / "pick.npz", "--html", tmp_path / "pick.html")[0] == 0
 

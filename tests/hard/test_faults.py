@@ -220,6 +220,7 @@ SEVERAL_SOLVES: dict[str, Sequence[str]] = {
     "rounds among obstacles": ("plan", "{scene}", "--intervals", "100"),
     "grids to a tolerance": (
         *("plan", "panda_reach_rich", "--starts", "1", "--tolerance", "1e-8"),
+        "--self-collision",  # or it may be over before the signal
     ),
 }
 BALL_ON_THE_WAY = """

@@ -100,6 +100,12 @@ class Trajectory(Positions, ExportMethods, TrajectorySummary):
         return self.grid.duration
 
     @property
+    def segment_durations(self) -> Array:
+        """Those of the segments of a motion in segments, shape (number,), in [s]; else (0,)."""
+        intervals = () if self.segments is None else self.segments.intervals
+        return np.diff(self.t[np.cumsum([0, *intervals])])
+
+    @property
     def t(self) -> Array:
         """Times of the nodes, shape (N + 1,), in [s]."""
         return self.grid.t

@@ -76,6 +76,8 @@ where it is), the number of such steps in a row after which the barrier paramete
 it has fallen too early, and the factor by which it is raised."""
 LEAST_RAISED_GAP = 1e-9
 """Least distance of slacks from their bounds after that, relative to the range."""
+OUTSIDE_RADIUS = 3.0
+"""Radius to which the trust region is cut where outputs are added outside of their bounds."""
 DENSITY_FLOOR = 1e-9
 """Mean density of the initial objective below which 1 is used as its scale."""
 MAX_FORCE = 1e12
@@ -334,6 +336,8 @@ class _Iteration(BoundedSteps[X]):
             self.objective.bounds, outputs.y, found.kept, found.origin, before
         )
         outside = float(barrier.outside(outputs.y)[len(found.kept) :].max(initial=0.0))
+        if outside > 0.0:
+            self.radius = min(self.radius, OUTSIDE_RADIUS)
         mu = min(REOPENED * outside, MOST_REOPENED) * self.density
         if mu > barrier.mu:  # room for the others to move
             margin = REOPENED * outside

@@ -25,6 +25,7 @@ def lengths(found: hovi.Solution) -> list[float]:
     assert said is not None
     each = [float(T) for T in re.split(", | and ", said[1])]
     assert sum(each) == pytest.approx(found.trajectory.duration, rel=1e-9)
+    np.testing.assert_allclose(found.trajectory.segment_durations, each, rtol=1e-9)
     return each
 
 

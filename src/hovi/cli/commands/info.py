@@ -112,8 +112,11 @@ def _examine(robot: Robot, json: bool, model: pin.Model | None = None) -> NoRetu
 
 def _motion(file: str) -> str:
     from hovi.cli.arguments.files import load_trajectory
+    from hovi.cli.reports.segments import span_text
+    from hovi.discrete.measures.motion_segments import motion_segments
     from hovi.discrete.output.caution import caution_lines
 
     motion = load_trajectory(Path(file))
-    lines = caution_lines([motion.metadata])
-    return "\n".join([repr(motion), *(f"caution: {each}" for each in lines)])
+    segments = [f"segment {span_text(each)}" for each in motion_segments(motion)]
+    cautions = [f"caution: {each}" for each in caution_lines([motion.metadata])]
+    return "\n".join([repr(motion), *segments, *cautions])

@@ -20,11 +20,15 @@ def segment_lines(solution: Solution, margins: Mapping[str, LimitMargins]) -> li
     return [
         (
             "segment",
-            f"{segment.name!r} from {segment.begin:.6g} to {segment.end:.6g} s, cost {cost:.6g}"
-            f"{_tightest(margins.get(segment.name))}",
+            f"{span_text(segment)}, cost {cost:.6g}{_tightest(margins.get(segment.name))}",
         )
         for segment, cost in _costs(solution)
     ]
+
+
+def span_text(segment: MotionSegment) -> str:
+    """The name of a segment, and when it begins and ends."""
+    return f"{segment.name!r} from {segment.begin:.6g} to {segment.end:.6g} s"
 
 
 def _tightest(margins: LimitMargins | None) -> str:
