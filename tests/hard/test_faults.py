@@ -6,6 +6,7 @@ Real processes throughout; each ends with a sentence on stderr, an exit code and
 from __future__ import annotations
 
 import contextlib
+import importlib
 import os
 import resource
 import shutil
@@ -15,9 +16,11 @@ import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+import hovi
 from hovi.cli.application import main
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import TrajectoryFileError
@@ -363,3 +366,25 @@ def test_the_longest_names_are_written(
 def test_a_name_that_no_file_can_have_is_an_error_of_the_system(name: str, tmp_path: Path) -> None:
     with pytest.raises(OSError, match="no file can have that name"), whole_file(tmp_path / name):
         pass
+
+
+@pytest.mark.parametrize("last", [2, 7, 8, 10])
+def test_an_interrupt_where_distances_begin_to_count_keeps_the_motion(
+    last: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Their rows have grown then, and their multipliers have not."""
+    rows = importlib.import_module("hovi.planning.solver.near.clearance_rows").ClearanceRows
+    add, grown = rows._add, 0
+
+    def adding(*given: Any) -> int:
+        nonlocal grown
+        added: int = add(*given)
+        grown += added > 0
+        if added > 0 and grown == last:
+            raise KeyboardInterrupt
+        return added
+
+    monkeypatch.setattr(rows, "_add", adding)
+    found = hovi.plan_task(hovi.load_task(hovi.example("ur5_around_sphere")), processes=1)
+    assert grown >= last
+    assert found.status == "interrupted"

@@ -106,7 +106,7 @@ def _searched(search: BoundedSearch) -> Answer:
     else:
         status, message = Status.SADDLE, _saddle(value, n_neg)
     instants, forces = None, None
-    if ended.why not in (Reason.TIME_LIMIT, Reason.DIVERGED):  # or rows may be of a later attempt
+    if ended.why not in (*STOPPED, Reason.DIVERGED):  # or rows may be of a later attempt
         instants, forces = search.forces(ended)
     history, central = search.history, None
     if status is Status.MINIMUM:
