@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import importlib
+from typing import Any
+
 import numpy as np
 import pytest
 
 import hovi
+from hovi.system.interruption import record_interrupt
 from oracles.mesh_distances import MeshDistances
 
 START = [0.0, -1.2, 1.0, -0.6, -0.8, 0.2]
@@ -48,3 +52,22 @@ def test_self_collision_that_changes_nothing_leaves_every_digit(
     again = kept.replan(goal=np.add(APART[1], 0.01))
     assert again.success, again.message
     assert again.margins().distance is not None
+
+
+def test_an_interrupt_before_links_were_looked_at_is_no_success(
+    scene: hovi.Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It comes when the motion that may pass through itself is a resolved minimum already."""
+    search = importlib.import_module("hovi.planning.search.search").Search
+    looked = search._of_whole
+
+    def interrupted(*given: Any) -> Any:
+        record_interrupt()
+        return looked(*given)
+
+    monkeypatch.setattr(search, "_of_whole", interrupted)
+    ends = START, THROUGH_ITSELF
+    given: dict[str, Any] = {"limits": "none", "self_collision": True, "processes": 1}
+    found = hovi.plan(scene, *ends, 1.5, **given)
+    assert (found.success, found.status) == (False, "interrupted")
+    assert "keeps links apart" in found.message

@@ -85,6 +85,9 @@ class Search:
         except OutOfTimeError:
             why = "the time limit was reached before distances between links were looked at"
             return ended_early(best, Status.TIME_LIMIT, why), ()
+        if whole is None and interrupted():
+            why = "it was interrupted before a motion that keeps links apart was looked for"
+            return ended_early(best, Status.INTERRUPTED, why), ()
         return self._over_branches() if whole is None else (whole, costs)
 
     def _over_branches(self) -> tuple[Solution, tuple[float, ...]]:
@@ -116,7 +119,7 @@ class Search:
         assert free.problem is not None
         problem = with_clearance(on_grid_of(free.problem, free), clearance)
         kept, near = dataclasses.replace(free, problem=problem), 0
-        ended = free.status in (*STOPPED, Status.INFEASIBLE) or interrupted()
+        ended = free.status in (*STOPPED, Status.INFEASIBLE)
         if not ended and problem.distances is not None:  # there are pairs, within reach
             near = len(near_pairs(free.trajectory, problem.distances, clearance.margin))
         if near:
