@@ -91,6 +91,7 @@ def test_a_plan_without_continuation_is_one_solve(light_hand: Scene, failed: Sol
 def test_more_steps_lead_to_the_minimum_of_a_solve_with_enough(arm_scene: Scene) -> None:
     stopped = plan(arm_scene, HANG, REACH_Q, 1.0, max_iterations=5, continuation=False, **GRID)
     assert stopped.status is Status.ITERATION_LIMIT
+    assert stopped.n_neg == 0
     found = plan(arm_scene, HANG, REACH_Q, 1.0, max_iterations=5, **GRID)
     assert found.status is Status.MINIMUM
     assert "continuation found this minimum by" in found.message

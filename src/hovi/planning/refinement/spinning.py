@@ -110,9 +110,9 @@ def fault_of_valley(
     """
     problem = solution.problem
     assert problem is not None
-    spinning = spin_without_limits(solution)
     if problem.has_limits or error is None:
         return ""
+    spinning = spin(solution)
     doubts = spinning is not None, error > CLOSE
     if not (all(doubts) if problem.limited else any(doubts)):
         return ""
