@@ -461,7 +461,7 @@ _rule(
     "one round before Lagrange-Newton",
     "With equations at nodes alone a rough minimisation with a penalty comes first.",
     "_minimized",
-    "begin.z is not None or len(objective.problem.passive) > 0",
+    "begin.z is not None or objective.problem.along or len(objective.problem.passive) > 0",
     "True",
 )
 _rule(
@@ -472,14 +472,6 @@ _rule(
     "None",
 )
 _at("equations", "planning.solver.methods.bounded_search")
-_rule(
-    "equations in the steps",
-    "Within limits steps satisfy conditions at nodes, instead of rounds.",
-    "BoundedSearch.solve",
-    "self._solved_under_equations(start)",
-    "None",
-    False,
-)
 _rule(
     "rounds begin where the last ended",
     "Each round within limits begins with the slacks and multipliers of the last.",

@@ -543,16 +543,17 @@ REFUSED: dict[str, tuple[Callable[[], Any], str]] = {
     "tolerance": (broken("q", tolerance=0.0), "needs a positive tolerance"),
     "small tolerance": (broken("q", tolerance=9e-7), "a positive tolerance of at least 1e-06"),
     "scale of a value": (
-        broken("q", hovi.Equal(), where=hovi.AtTimes(0.5), scale=2.0),
-        "leave its `scale` and `tolerance` out",
+        broken("q", hovi.Equal(), scale=2.0),
+        "leave its `scale` out",
     ),
     "tolerance of a value": (
         broken("q", hovi.Equal(), where=hovi.AtTimes(0.5), tolerance=1e-3),
-        "leave its `scale` and `tolerance` out",
+        "and at given times its `tolerance`",
     ),
     "names": (broken("q", of=("elbow",)), "needs 6 names"),
     "set": (broken("q", 3), "needs a hovi.Between or a hovi.Equal"),
-    "along": (broken("q", hovi.Equal()), "an equation along the whole motion"),
+    "place": (broken("q", hovi.Equal(), where=0.5), "needs hovi.AtTimes(times) as `where`"),
+    "torque along": (broken("tau", hovi.Equal()), "an equation of torques at all times"),
     "bounds at times": (broken("q", where=hovi.AtTimes(0.5)), "which hold at all times"),
     "torque at times": (
         broken("tau", hovi.Equal(), where=hovi.AtTimes(0.5)),

@@ -278,19 +278,19 @@ def test_newton_steps_with_one_more_unknown_solve_its_kkt_system(room: tuple[flo
     model, H, A = bordered(50.0, room)
     assert isinstance(model.inner, EquationModel)
     delta, residual = SOFTNESS / 1e3, model.inner.residual
-    softened = H + A.T @ A / delta  # by elimination of the multipliers
-    gradient = model.gradient + A.T @ residual / delta
     factor = model.factor(0.0)
     step, slope, _ = model.descend(factor)
     assert room[0] <= step[-1] <= room[1]
     free = np.ones(len(H), dtype=bool)
     free[-1] = abs(step[-1]) < room[1]
-    outward = (softened[-1] @ step + gradient[-1]) * step[-1]
+    expected, held = step.copy(), step[~free]
+    kkt = np.block([[H[np.ix_(free, free)], A[:, free].T], [A[:, free], -delta * np.eye(len(A))]])
+    force = model.gradient[free] + H[np.ix_(free, ~free)] @ held
+    solved = np.linalg.solve(kkt, -np.append(force, residual + A[:, ~free] @ held))
+    expected[free] = solved[: free.sum()]
+    outward = (H[-1] @ expected + A[:, -1] @ solved[free.sum() :] + model.gradient[-1]) * step[-1]
     assert free[-1] == (room[1] > 1)
     assert free[-1] or outward < 0
-    expected = step.copy()
-    rest = gradient[free] + softened[np.ix_(free, ~free)] @ step[~free]
-    expected[free] = np.linalg.solve(softened[np.ix_(free, free)], -rest)
     np.testing.assert_allclose(step, expected, atol=1e-7 * np.abs(expected).max())
     decrease = -model.gradient @ step - 0.5 * step @ H @ step
     assert -0.5 * slope == pytest.approx(decrease, rel=1e-4)

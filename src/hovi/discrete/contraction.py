@@ -51,6 +51,10 @@ class Expansion:
         """The discrete action, the sum of all L_d."""
         return float(np.sum(self.values))
 
+    def charts_of(self, batch: int) -> AnyCharts | None:
+        """The charts of a batch of intervals; None if they are the identity."""
+        return None if self.charts is None else self.charts[batch]
+
 
 def joined(
     batches: Sequence[IntervalBatch | InstantBatch], parts: list[Expansion], N: int, m: int

@@ -21,7 +21,7 @@ from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 
-SOFTNESS = 1e-4
+SOFTNESS = 1e-6
 """delta times the penalty."""
 
 

@@ -5,6 +5,7 @@ This is the only interface between CasADi and Pinocchio below it and NumPy and L
 
 from __future__ import annotations
 
+import dataclasses
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import NamedTuple
@@ -43,6 +44,15 @@ class PointTerms:
     output_weight: Array
     leading_weight: Array | None = None
     time_gradient: Array | None = None
+
+    def plus(self, gradient: Array, curvature: Array) -> PointTerms:
+        """With a gradient and a Hessian in the jet, (P, m) and (P, m, m), m = (k + 1) nv, more."""
+        if self.leading_weight is not None:
+            curvature = curvature.copy()
+            m = self.leading_weight.shape[1]
+            curvature[:, :m, :m] += self.leading_weight
+        jet_gradient = self.jet_gradient + gradient
+        return dataclasses.replace(self, jet_gradient=jet_gradient, leading_weight=curvature)
 
     @classmethod
     def on_outputs(cls, gradient: Array, jet_size: int) -> PointTerms:

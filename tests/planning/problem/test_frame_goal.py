@@ -8,7 +8,7 @@ import pytest
 
 import hovi
 from hovi.errors import InputError
-from hovi.planning.conditions.function import Function, bend, linear
+from hovi.planning.conditions.function import Function, at_state, linear
 from hovi.planning.conditions.state_difference import StateDifference
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.inverse_kinematics import nearest_configuration
@@ -50,7 +50,8 @@ def test_the_equations_of_a_goal_have_exact_derivatives(panda: Robot, kind: str)
     np.testing.assert_allclose(J[:, 0], derivative(lambda x: linear(error, x, v)[0], q), atol=1e-9)
     assert not J[:, 1].any()
     slope = derivative(lambda x: weights @ linear(error, x, v)[1][:, 0], q)
-    np.testing.assert_allclose(bend(error, q, v, weights)[0, :, 0], slope, atol=1e-9)
+    curvature = error.curvature(at_state(q, v), weights[None])[("q", "q")][0]
+    np.testing.assert_allclose(curvature, slope, atol=1e-9)
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -96,8 +97,8 @@ def test_the_derivatives_are_taken_along_the_configuration_space() -> None:
             ),
             np.zeros(robot.nv),
         )
-        curvature = bend(error, q, v, weights)[0, :, 0]
-        np.testing.assert_allclose(curvature, slope, atol=1e-6)
+        curvature = error.curvature(at_state(q, v), weights[None]).get(("q", "q"), np.zeros(1))
+        np.testing.assert_allclose(curvature[0], slope, atol=1e-6)
 
 
 def test_a_goal_out_of_reach_is_reported_with_its_distance(ur5: Robot) -> None:

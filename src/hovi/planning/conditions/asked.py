@@ -12,8 +12,14 @@ import numpy as np
 from hovi.discrete.cells import INSTANTS
 from hovi.discrete.grid import Grid
 from hovi.errors import InputError
-from hovi.planning.conditions.condition import Condition, Equation, Inequality, with_function
-from hovi.planning.conditions.places import AtNode, AtTimes
+from hovi.planning.conditions.condition import (
+    Condition,
+    Equation,
+    EquationAlong,
+    Inequality,
+    with_function,
+)
+from hovi.planning.conditions.places import Along, AtNode, AtTimes
 from hovi.planning.conditions.sets import Between
 from hovi.robot.space.coordinates import Coordinates
 from hovi.scene.segmented_lagrangian import NODE_TOLERANCE
@@ -89,6 +95,11 @@ def times_of(given: Conditions) -> list[float]:
 def bounded_of(given: Conditions) -> tuple[Inequality, ...]:
     """Those that hold at all times."""
     return tuple(each for each in given if isinstance(each.on, Between))
+
+
+def along_of(given: Conditions) -> tuple[EquationAlong, ...]:
+    """The equations that hold at all times."""
+    return tuple(each for each in given if isinstance(each.where, Along))
 
 
 def need_torques(bounded: Sequence[Inequality]) -> bool:

@@ -15,10 +15,10 @@ from hovi.checks.kinds import is_number
 from hovi.checks.shapes import numbers_of
 from hovi.discrete.grid import DiscretePath
 from hovi.errors import InputError
-from hovi.planning.conditions.expression import FunctionLike, function_of
-from hovi.planning.conditions.function import Function, bend, linear
+from hovi.planning.conditions.expression import Expression, FunctionLike, function_of
+from hovi.planning.conditions.function import Function, Rate, linear
 from hovi.planning.conditions.places import Along, AtNode, AtPoints, AtTimes, Where
-from hovi.planning.conditions.sets import Between, Equal, TwoSided
+from hovi.planning.conditions.sets import Between, Equal, Near, TwoSided
 from hovi.robot.space.coordinates import Coordinates
 from hovi.system.dataclass import dataclass
 
@@ -36,19 +36,20 @@ EVERYWHERE: Any = AtPoints()
 class Condition(Generic[Values, Place]):
     """y(q, v, a, tau, t) in a set, at instants of a motion.
 
-    Bounds of y(q, v, a, tau, t) hold at all times, values of y(q, v, t) at given times. Equations
-    along the whole motion are not supported.
+    Bounds of y(q, v, a, tau, t) and values of y(q, v, a, t) hold at all times, values of y(q, v, t)
+    at given times.
 
     function: y: a formula as of the effect RunningCost, which may be a column, as in "tau * v"; a
         function that returns a CasADi expression of the arguments that it names, of q, v, a, tau
         and t; or a hovi.Function.
     on: hovi.Between(lower, upper) or hovi.Equal(value).
-    where: hovi.AtTimes(times) for a value; left out for bounds.
+    where: hovi.AtTimes(times) for a value at some times; left out for all times.
     name: in messages. unit: of y, in messages. of: names of its entries there, such as joints.
     scale: of bounded y, one number or one for each entry: by default upper - lower, or
         max(1, |bound|) of a single bound. Bounds that are functions of time need it.
-    tolerance: fraction of the scale by which a bound may be exceeded anywhere, at least 1e-6.
-        Values at given times have neither: they are missed by at most 1e-6.
+    tolerance: at least 1e-6: the fraction of the scale by which a bound may be exceeded anywhere;
+        by how much y may miss a value between the nodes of a grid, in the unit of y. Values have no
+        scale, and those at given times no tolerance: they are missed by at most 1e-6.
     Raises InputError for anything else.
     """
 
@@ -77,10 +78,11 @@ class Condition(Generic[Values, Place]):
                 f"condition {self.name!r} needs a positive tolerance of at least {TOLERANCE:g}, "
                 f"not {self.tolerance!r}."
             )
-        if isinstance(self.on, Equal) and (self.scale is not None or self.tolerance != TOLERANCE):
+        timed = isinstance(self.where, AtTimes) and self.tolerance != TOLERANCE
+        if isinstance(self.on, Equal) and (self.scale is not None or timed):
             raise InputError(
-                f"condition {self.name!r} has a value, which is missed by at most 1e-6: leave its "
-                "`scale` and `tolerance` out, which are those of bounds, or use a hovi.Between."
+                f"condition {self.name!r} has a value: leave its `scale` out, which is that of "
+                "bounds, and at given times its `tolerance`, or use a hovi.Between."
             )
         if self.scale is not None:
             scale = numbers_of(f"the scale of condition {self.name!r}", self.scale)
@@ -115,10 +117,10 @@ class Condition(Generic[Values, Place]):
 
 def _require_place(given: Condition[Any, Any]) -> None:
     """Raise InputError for sets at places that are not supported."""
-    if isinstance(given.on, Equal) and not isinstance(given.where, AtNode | AtTimes | Along):
+    if not isinstance(given.where, Where):
         raise InputError(
-            f"condition {given.name!r} is an equation along the whole motion, which is not "
-            "supported: use `where = hovi.AtTimes(...)`, or a hovi.Between with some room."
+            f"condition {given.name!r} needs hovi.AtTimes(times) as `where`, or none for all "
+            f"times, got {given.where!r:.200}."
         )
     if isinstance(given.on, TwoSided) and isinstance(given.where, AtNode | AtTimes | Along):
         raise InputError(
@@ -128,6 +130,8 @@ def _require_place(given: Condition[Any, Any]) -> None:
 
 Equation = Condition[Equal, AtNode]
 """c(q, v) = value at a node."""
+EquationAlong = Condition[Equal, Along]
+"""y(q, v, a, t) = value at all times."""
 Inequality = Condition[Between, AtPoints]
 """lower <= y(q, v, a, tau, t) <= upper at all times."""
 
@@ -141,11 +145,14 @@ def with_function(
     Raises InputError for a function, bounds, a value or a scale that do not fit each other.
     """
     y = function_of(given.function, given.name, coordinates)
+    where = given.where
     if isinstance(given.on, Between):
         given.on.at(np.zeros(1), y.size)
     else:
         _require_size("value", given, np.asarray(given.on.value), y.size)
-        if more := sorted(y.needs - {"q", "v", "t"}):
+        if not isinstance(where, AtTimes):
+            where = _along(given, y, coordinates)
+        elif more := sorted(y.needs - {"q", "v", "t"}):
             raise InputError(
                 f"condition {given.name!r} at given times must be a function of q, v and t, but it "
                 f"depends on {' and '.join(more)}."
@@ -157,7 +164,35 @@ def with_function(
             f"condition {given.name!r} needs {y.size} names in `of`, one for each value of its "
             f"function, got {len(given.of)}."
         )
-    return dataclasses.replace(given, function=y)
+    return dataclasses.replace(given, function=y, where=where)
+
+
+def _along(given: Condition[Equal | Between, Where], y: Function, on: Coordinates) -> Along:
+    """Where an equation along the motion holds. Raises InputError for one that cannot."""
+    if "tau" in y.needs:
+        raise InputError(
+            f"condition {given.name!r} is an equation of torques at all times, which is not "
+            "supported: name joints without torque as `passive`, or use a hovi.Between with some "
+            "room."
+        )
+    level = max((i for i, x in enumerate(("q", "v", "a")) if x in y.needs), default=0)
+    if level == 0 and not isinstance(y, Expression) and on.curved_space is not None:
+        raise InputError(
+            f"condition {given.name!r} is an equation of orientations at all times, and needs the "
+            "derivative of its function in time: give a formula or a function of CasADi symbols."
+        )
+    return Along(level)
+
+
+def near(each: EquationAlong) -> Condition[TwoSided, AtPoints]:
+    """What an equation along a motion accepts between the nodes, in units of its tolerance."""
+    room, names = Near(each.on.value, each.tolerance), (each.name, each.unit)
+    return Condition(each.y, room, EVERYWHERE, *names, each.tolerance, of=each.of)
+
+
+def rate_of(function: Function) -> Function:
+    """dy/dt of a function of q and t, as one of q, v and t."""
+    return function.rate if isinstance(function, Expression) else Rate(function)
 
 
 def _require_size(
@@ -196,11 +231,6 @@ def linear_at(each: Equation, q: Array, v: Array) -> tuple[Array, Array]:
     """c - value at a state, shape (k,), and its Jacobian in (q, v), shape (k, 2, nv)."""
     c, J = linear(each.y, q, v, each.where.time)
     return each.on.missed(c), J
-
-
-def bend_at(each: Equation, q: Array, v: Array, weights: Array) -> Array:
-    """sum_i weights_i d2 c_i at a state, shape (2, nv, 2, nv)."""
-    return bend(each.y, q, v, weights, each.where.time)
 
 
 def missed(each: Equation, x: DiscretePath) -> str:

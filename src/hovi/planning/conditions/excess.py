@@ -55,7 +55,7 @@ def excess_along(motion: Trajectory, given: Condition[TwoSided, Any]) -> Array:
     wherever the curvature of the samples allows an excess between them: a motion along a bound has
     several extremes, and the largest one is not always next to the largest sample.
     """
-    return _found_along(motion, given)[0]
+    return largest_excess(motion, given)[0]
 
 
 def excess_of(motion: Trajectory, given: Condition[TwoSided, Any]) -> Array:
@@ -79,7 +79,7 @@ def excess_of(motion: Trajectory, given: Condition[TwoSided, Any]) -> Array:
 
 def worst(motion: Trajectory, given: Condition[TwoSided, Any]) -> tuple[float, str]:
     """The largest excess as a fraction of the scale, and the value, time and bound in words."""
-    sides, at = _found_along(motion, given)
+    sides, at = largest_excess(motion, given)
     side, k, entry = np.unravel_index(int(np.argmax(sides)), sides.shape)
     y, low, high, t = _values(motion, given, np.array([k]), at[side, [k], entry])
     bound = (low, high)[side][0, entry]
@@ -163,7 +163,8 @@ def _torque_cells(motion: Trajectory, given: Condition[TwoSided, Any]) -> Cells:
     return TorqueCells(motion, over, joints, scales(given) if limited else np.ones(0)).cells
 
 
-def _found_along(motion: Trajectory, given: Condition[TwoSided, Any]) -> Excess:
+def largest_excess(motion: Trajectory, given: Condition[TwoSided, Any]) -> Excess:
+    """`excess_along`, and the position of each in its interval, (2, N, size)."""
     return _with_narrow(
         _excess_in(Cells.of(motion.grid.intervals, 1), motion, given), motion, given
     )

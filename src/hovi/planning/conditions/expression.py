@@ -57,7 +57,18 @@ class Expression(Function):
         later = copy.copy(self)
         later._begin = self._begin + time
         vars(later).pop("_enclosure", None)
+        if "rate" in vars(self):
+            vars(later)["rate"] = self.rate.from_time(time)
         return later
+
+    @cached_property
+    def rate(self) -> Function:
+        """dy/dt of y(q, t)."""
+        q, v, t = (self._symbols[x] for x in ("q", "v", "t"))
+        empty = ca.SX(0, 1)
+        J = tangent.jacobian(self._y, (q, empty, empty, t), self._space)
+        rate = Expression(self._symbols, J @ v + ca.jacobian(self._y, t), self._space)
+        return rate.from_time(self._begin) if self._begin else rate
 
     @property
     def function(self) -> ca.Function:
@@ -107,7 +118,8 @@ class Expression(Function):
         """The functions without the expression, which cannot be pickled."""
         functions = {name: getattr(self, name) for name in ("_values", "_slopes", "_curvature")}
         kept = ("_named", "_names", "_n", "_size", "_pairs", "_begin")
-        return functions | {name: getattr(self, name) for name in kept}
+        known = {"rate": self.rate} if "rate" in vars(self) else {}
+        return functions | {name: getattr(self, name) for name in kept} | known
 
     @cached_property
     def _enclosure(self) -> Enclosure:

@@ -19,6 +19,8 @@ Curvature = Mapping[tuple[str, str], Array]
 """See `Function.curvature`."""
 ARGUMENTS = "q", "v", "a", "tau", "t"
 """What a function may depend on."""
+DIFFERENCE = 6e-6
+"""Step of central differences, in [rad], [m] and [s]."""
 
 
 @check_arguments
@@ -101,6 +103,58 @@ class Function(ABC):
         return f"its entry {entry} misses it by {abs(missed[entry]):.3g}"
 
 
+class Rate(Function):
+    """dy/dt of a function y(q, t) on a vector space, with differences of its curvature."""
+
+    def __init__(self, of: Function) -> None:
+        self.of = of
+
+    @property
+    def needs(self) -> frozenset[str]:
+        """See Function."""
+        return self.of.needs | {"q", "v"}
+
+    @property
+    def size(self) -> int:
+        """See Function."""
+        return self.of.size
+
+    def values(self, at: Points) -> Array:
+        """J v, and the partial derivative in time."""
+        rate = np.matmul(self.of.slopes(at)["q"], at.v[:, :, None])[:, :, 0]
+        if "t" in self.needs:
+            before, after = (replace(at, t=at.t + step) for step in (-DIFFERENCE, DIFFERENCE))
+            rate += (self.of.values(after) - self.of.values(before)) / (2 * DIFFERENCE)
+        return np.asarray(rate)
+
+    def slopes(self, at: Points) -> Slopes:
+        """d(J v), and in time by differences."""
+        P, n, J = len(at.q), at.v.shape[1], self.of.slopes(at)["q"]
+        bent = np.zeros((P, self.size, n))
+        for entry, weights in enumerate(np.eye(self.size)):
+            H = self.of.curvature(at, np.tile(weights, (P, 1))).get(("q", "q"))
+            if H is not None:
+                bent[:, entry] = np.matmul(H, at.v[:, :, None])[:, :, 0]
+        if "t" in self.needs:
+            before, after = (replace(at, t=at.t + step) for step in (-DIFFERENCE, DIFFERENCE))
+            bent += (self.of.slopes(after)["q"] - self.of.slopes(before)["q"]) / (2 * DIFFERENCE)
+        return {"q": bent, "v": J}
+
+    def curvature(self, at: Points, weights: Array) -> Curvature:
+        """Differences of the function's own along v, and itself in q and v."""
+        own = self.of.curvature(at, weights).get(("q", "q"))
+        if own is None:
+            return {}
+        size = DIFFERENCE / np.maximum(np.abs(at.v).max(axis=1, keepdims=True), 1.0)
+        before, after = (replace(at, q=at.q + s * at.v, t=at.t + s[:, 0]) for s in (-size, size))
+        ends = [self.of.curvature(x, weights)[("q", "q")] for x in (before, after)]
+        return {("q", "q"): (ends[1] - ends[0]) / (2 * size[:, :, None]), ("q", "v"): own}
+
+    def from_time(self, time: float) -> Function:
+        """See Function."""
+        return Rate(self.of.from_time(time))
+
+
 class LaterFunction(Function):
     """A function by a clock that starts at a time, in [s]. of: the function."""
 
@@ -162,18 +216,6 @@ def linear(function: Function, q: Array, v: Array, t: float = 0.0) -> tuple[Arra
     for name, slope in function.slopes(at).items():
         J[:, STATE.index(name)] = slope[0]
     return function.values(at)[0], J
-
-
-def bend(function: Function, q: Array, v: Array, weights: Array, t: float = 0.0) -> Array:
-    """sum_i weights_i d2 y_i at a state, shape (2, nv, 2, nv); arguments as for `linear`."""
-    n = len(v)
-    total = np.zeros((2, n, 2, n))
-    for (x, y), block in function.curvature(at_state(q, v, t), np.asarray(weights)[None]).items():
-        i, j = STATE.index(x), STATE.index(y)
-        total[i, :, j] += block[0]
-        if i != j:
-            total[j, :, i] += block[0].T
-    return total
 
 
 def at_state(q: Array, v: Array, t: float = 0.0) -> Points:

@@ -70,7 +70,16 @@ class Exchange:
 
 @dataclass(frozen=True)
 class Along:
-    """At all times: equations, in as many moments of an interval as it has unknowns for them."""
+    """At all times: equations, of which a grid imposes as many as a curve has unknowns for them.
+
+    For functions of level l, that of the highest derivative of q in them, and motions of order k:
+    k - l at every node, the value and its first derivatives in time, and r + l moments of every
+    interval with r inner modes. Between the nodes they are missed by O(h^(r + 4 - l)).
+
+    level: l, from 0 to 2.
+    """
+
+    level: int
 
 
 Where = AtNode | AtTimes | AtPoints | ControlPoints | Exchange | Along

@@ -136,6 +136,23 @@ class Between(TwoSided):
 
 
 @dataclass(frozen=True, eq=False)
+class Near(TwoSided):
+    """Within a distance of values that should be equal to others.
+
+    value: those of an Equal. room: the largest distance that is accepted.
+    """
+
+    value: npt.ArrayLike
+    room: float
+
+    def at(self, t: Array, size: int | None, within: Array | None = None) -> tuple[Array, Array]:
+        """See TwoSided."""
+        value = np.asarray(self.value, dtype=float)
+        value = np.broadcast_to(value, (len(t), value.size if size is None else size))
+        return value - self.room, value + self.room
+
+
+@dataclass(frozen=True, eq=False)
 class _Later:
     """A bound that is a function of time, by a clock that starts at `time`."""
 

@@ -38,7 +38,7 @@ def between_ends(problem: TrajectoryProblem) -> Iterator[Condition[Any, Any]]:
     """What is asked of a motion that has its ends.
 
     What is given at seams; no torque at passive joints; equations at nodes; limits; bounds of
-    functions; distances.
+    functions; distances. Equations at all times come after those at nodes, which have their own.
     """
     for hold in problem.holds:
         verb = f"passes t = {hold.time:.4g} s"
@@ -46,8 +46,9 @@ def between_ends(problem: TrajectoryProblem) -> Iterator[Condition[Any, Any]]:
         yield Condition(y, Equal(), AtNode(hold.node, hold.time, True))
     if len(problem.passive) > 0:
         torque, names = JointQuantity("tau", problem.passive), passive_joints(problem)
-        yield Condition(torque, Equal(), Along(), names)
+        yield Condition(torque, Equal(), Along(2), names)
     yield from problem.equations
+    yield from problem.along
     if problem.limits is not None:
         on = problem.coordinates
         yield from limit_conditions(problem.limits, problem.grid.order, on.curved_space, on)

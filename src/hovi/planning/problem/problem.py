@@ -24,8 +24,21 @@ from hovi.errors import InputError, warn
 from hovi.planning.clearance.clearance import Clearance
 from hovi.planning.clearance.distances import Distances
 from hovi.planning.clearance.within_reach import distances_within_reach, with_gaps
-from hovi.planning.conditions.asked import asked_at_nodes, bounded_of, checked, require_ranges
-from hovi.planning.conditions.condition import Condition, Equation, Inequality, equation
+from hovi.planning.conditions.asked import (
+    along_of,
+    asked_at_nodes,
+    bounded_of,
+    checked,
+    require_ranges,
+)
+from hovi.planning.conditions.condition import (
+    Condition,
+    Equation,
+    EquationAlong,
+    Inequality,
+    equation,
+)
+from hovi.planning.problem.along_nodes import NodeState, equations_at_nodes, missed_where_given
 from hovi.planning.problem.clock import Clock, Lengths
 from hovi.planning.problem.conserved_momentum import Stop, kept_in_free_fall
 from hovi.planning.problem.frame_goal import FrameGoal
@@ -80,7 +93,8 @@ class TrajectoryProblem(ProblemSummary):
         in free components.
     free_ends: which of (q, q', ..., q^(k-1)) are free at the start and at the goal, shape
         (2, k, nv).
-    equations: at nodes. holds: what is fixed where segments meet.
+    equations: at nodes. along: those at all times, whose part at nodes is among `equations`.
+    holds: what is fixed where segments meet.
     unreachable: why the goal cannot be reached, or "".
     turns: full turns of the guess beyond the shortest path, after the last seam if there are any,
         rotation vectors over 2 pi, (nv,).
@@ -98,6 +112,7 @@ class TrajectoryProblem(ProblemSummary):
     ends: tuple[Array, ...] = field(init=False, repr=False)
     free_ends: Mask = field(init=False, repr=False)
     equations: tuple[Equation, ...] = field(init=False, repr=False)
+    along: tuple[EquationAlong, ...] = field(init=False, repr=False)
     holds: tuple[Hold, ...] = field(init=False, repr=False)
     unreachable: str = field(init=False, repr=False)
     turns: Array = field(init=False, repr=False)
@@ -134,6 +149,7 @@ class TrajectoryProblem(ProblemSummary):
         unreachable = end.reason or passed.reason
         asked = asked_at_nodes(self.conditions, self.grid)
         object.__setattr__(self, "equations", (*equations, *passed.equations, *asked))
+        object.__setattr__(self, "along", along_of(self.conditions))
         object.__setattr__(self, "holds", passed.holds)
         self._set_ends(first, end.state)
         require_free(asked, self)
@@ -144,10 +160,31 @@ class TrajectoryProblem(ProblemSummary):
             unreachable = unreachable or refused
             if excused != limits.excused:
                 object.__setattr__(self, "limits", dataclasses.replace(limits, excused=excused))
+        if self.along:
+            unreachable = unreachable or self._set_equations_along()
         object.__setattr__(self, "unreachable", unreachable)
         if self.clearance is not None:  # raises for missing collision shapes
             ends = self.ends[0], self.free_ends, self.grid.duration
             object.__setattr__(self, "clearance", with_gaps(self.robot, self.clearance, *ends))
+
+    def _set_equations_along(self) -> str:
+        """Add equations along the motion at the nodes; what they miss where all is given, or ""."""
+        (q0, q1), (v0, v1), N = self.ends[0], self.ends[1], self.grid.intervals
+        given = {
+            each.where.node: NodeState(
+                f"t = {each.where.time:.4g} s", q0, v0, np.ones_like(self.free_ends[0, :2])
+            )
+            for each in self.equations
+        }
+        given |= {
+            hold.node: NodeState(f"t = {hold.time:.4g} s", hold.q, hold.v, ~hold.fixed)
+            for hold in self.holds
+        }
+        given[0] = NodeState("the start", q0, v0, self.free_ends[0, :2])
+        given[N] = NodeState("the goal", q1, v1, self.free_ends[1, :2])
+        known = self.along, self.grid, given, self.equations
+        object.__setattr__(self, "equations", (*self.equations, *equations_at_nodes(*known)))
+        return missed_where_given(*known)
 
     def _leave_out_what_is_conserved(self) -> str:
         """Free what conserved momenta imply at seams and the goal; why they forbid these, or ""."""
@@ -397,8 +434,8 @@ class TrajectoryProblem(ProblemSummary):
 
     @property
     def constrained(self) -> bool:
-        """Whether there are equality constraints: conditions at nodes or passive joints."""
-        return bool(self.equations) or len(self.passive) > 0
+        """Whether there are equality constraints: at nodes, at all times, or passive joints."""
+        return bool(self.equations or self.along) or len(self.passive) > 0
 
     @property
     def plain(self) -> bool:

@@ -13,7 +13,6 @@ With r + 2 points the moments vanish exactly where the torque vanishes at every 
 
 from __future__ import annotations
 
-from functools import cached_property
 from typing import Self
 
 import numpy as np
@@ -22,7 +21,7 @@ import numpy.typing as npt
 from hovi.discrete.contraction import Expansion
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.interval_batch import IntervalBatch
-from hovi.discrete.interval_charts import IntervalCharts
+from hovi.planning.problem.interval_moments import IntervalMoments
 from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
@@ -36,7 +35,7 @@ class TorqueMoments:
     batches: those of each batch of intervals. passive: indices in v of the passive joints.
     """
 
-    batches: list[_BatchMoments]
+    batches: list[IntervalMoments]
     passive: Index
 
     @classmethod
@@ -49,7 +48,7 @@ class TorqueMoments:
     @classmethod
     def everywhere(cls, ld: DiscreteLagrangian, passive: Index) -> Self:
         """As `of`, and where passive torques vanish at all points one moment for each of these."""
-        return cls([_BatchMoments(batch) for batch in ld.interval_batches], passive)
+        return cls([_moments(batch) for batch in ld.interval_batches], passive)
 
     def scaled(self, torques: Array, batch: int) -> Array:
         """sqrt(h) m_j of the intervals of a batch, flat: their squares are those of `squares`."""
@@ -59,12 +58,7 @@ class TorqueMoments:
     def scaled_slopes(self, expansion: Expansion, batch: int) -> Array:
         """Slopes of `scaled` in the nodal columns of the intervals, shape (B, K p, m, n)."""
         moments, (_, J) = self.batches[batch], expansion.outputs[batch]
-        if expansion.charts is None:
-            slopes = moments.slopes(J[:, self.passive])
-        else:
-            charts = expansion.charts[batch]
-            assert isinstance(charts, IntervalCharts)  # torques have Lagrangians of order 2
-            slopes = moments.slopes_in_charts(J[:, self.passive], charts)
+        slopes = moments.slopes(J[:, self.passive], expansion.charts_of(batch))
         return np.asarray(slopes / moments.root_steps[..., None])
 
     def spread(self, multipliers: Array, batch: int) -> Array:
@@ -102,13 +96,7 @@ class TorqueMoments:
         expansion: in nodal columns.
         """
         for i, (moments, (_, J)) in enumerate(zip(self.batches, expansion.outputs, strict=True)):
-            jacobian = J[:, self.passive]
-            if expansion.charts is None:
-                slopes = moments.slopes(jacobian)
-            else:
-                charts = expansion.charts[i]
-                assert isinstance(charts, IntervalCharts)  # torques have Lagrangians of order 2
-                slopes = moments.slopes_in_charts(jacobian, charts)
+            slopes = moments.slopes(J[:, self.passive], expansion.charts_of(i))
             B, rows, m, n = slopes.shape
             flat = slopes.reshape(B, rows, m * n)
             scaled = flat.transpose(0, 2, 1) * (weight / moments.batch.h[:, None, None])
@@ -116,53 +104,8 @@ class TorqueMoments:
             expansion.hessian[moments.batch.index, :m, :m] += blocks.transpose(0, 1, 3, 2, 4)
 
 
-@dataclass(frozen=True, eq=False)
-class _BatchMoments:
-    """Moments over B intervals of one scheme with Q points, against K test functions."""
-
-    batch: IntervalBatch
-
-    @cached_property
-    def tests(self) -> Array:
-        """P_j at the points, (K, Q); one per point where a torque vanishes at every point."""
-        scheme = self.batch.scheme
-        return np.diag(scheme.weights**-0.5) if scheme.moments is None else scheme.moments
-
-    @cached_property
-    def root_steps(self) -> Array:
-        """sqrt(h), shape (B, 1, 1)."""
-        return np.sqrt(self.batch.h)[:, None, None]
-
-    @cached_property
-    def _weighted(self) -> Array:
-        """w_q P_j at the points, (K, Q)."""
-        return self.tests * self.batch.scheme.weights
-
-    @cached_property
-    def _columns(self) -> Array:
-        """P_j times the R = k + 1 rows of the table at each point, (K m, R Q)."""
-        products = np.einsum("kq,qdm->kmqd", self.tests, self.batch.scheme.nodal_table)
-        return np.asarray(products.reshape(-1, products.shape[2] * products.shape[3]))
-
-    def of(self, torques: Array) -> Array:
-        """m_j, shape (B, K, p), of torques at the points, shape (P, p)."""
-        points = torques.reshape(-1, self.tests.shape[1], torques.shape[1])
-        return np.asarray(np.matmul(self._weighted, points))
-
-    def slopes(self, jacobian: Array) -> Array:
-        """h dm_j in the nodal columns of the intervals, shape (B, K p, m, n).
-
-        jacobian: of the torques in (q, v, ...) at the points, shape (P, p, R n).
-        """
-        (K, Q), B, p = self.tests.shape, len(self.batch.h), jacobian.shape[1]
-        R = self.batch.scheme.nodal_table.shape[1]
-        by_row = jacobian.reshape(B, Q, p, R, -1).transpose(0, 1, 3, 2, 4)
-        by_row = by_row * self.batch.row_weights[..., None, None]
-        slopes = np.matmul(self._columns, by_row.reshape(B, R * Q, -1))
-        slopes = slopes.reshape(B, K, -1, p, by_row.shape[-1]).transpose(0, 1, 3, 2, 4)
-        return np.asarray(slopes.reshape(B, K * p, *slopes.shape[3:]))
-
-    def slopes_in_charts(self, jacobian: Array, charts: IntervalCharts) -> Array:
-        """As `slopes`, by the chain rule of the charts."""
-        slopes = charts.nodal_moments(self.tests, jacobian)
-        return slopes.reshape(len(slopes), -1, *slopes.shape[3:])
+def _moments(batch: IntervalBatch) -> IntervalMoments:
+    """Against P_0 .. P_(r+1), or one for each point where a torque vanishes at every point."""
+    scheme = batch.scheme
+    tests = np.diag(scheme.weights**-0.5) if scheme.moments is None else scheme.moments
+    return IntervalMoments(batch, tests)

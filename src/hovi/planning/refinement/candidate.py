@@ -12,6 +12,7 @@ from hovi.discrete.curve_integral import integral_along
 from hovi.discrete.measures.motion_error import relative_difference
 from hovi.errors import InputError
 from hovi.planning.problem.tolerance import CURVE_TOLERANCE, Quantity, Tolerance
+from hovi.planning.refinement.between_nodes import missed_between_nodes
 from hovi.planning.refinement.error_estimate import (
     FinerSolution,
     estimate_against,
@@ -20,11 +21,6 @@ from hovi.planning.refinement.error_estimate import (
 from hovi.planning.refinement.faults.along_motion import may_be_narrow
 from hovi.planning.refinement.limit_sensitivity import cost_of_tolerance
 from hovi.planning.refinement.nodal_hamiltonian import nodal_hamiltonian
-from hovi.planning.refinement.passive_torque import (
-    NEGLIGIBLE_FRACTION,
-    PassiveTorque,
-    passive_torque,
-)
 from hovi.planning.solver.limits.limit_rows import MAX_LOSS
 from hovi.planning.solver.outcome.cost_with_time import price_of_time
 from hovi.planning.solver.solver import Solution
@@ -59,7 +55,7 @@ class Candidate:
         NaN if unknown.
     along: relative error of the integral of L~ along the curve; 0 for schemes without a curve.
     narrow: whether effects may change in a short time, so that the tolerance holds along the curve.
-    passive: torques of passive joints along the curve; None as for `passive_torque`.
+    missed: what equations are missed by between the nodes; None as for `missed_between_nodes`.
     uncancelled: the error with the sum of |contributions| instead of their sum, and at least the
         error inferred from the Hamiltonian.
     contradicted: relative difference from the cost on the next grid if it is far larger than the
@@ -74,7 +70,7 @@ class Candidate:
     error: float = np.nan
     uncancelled: float = np.nan
     along: float = np.nan
-    passive: PassiveTorque | None = None
+    missed: Array | None = None
     contradicted: float = 0.0
     later: float = 0.0
     narrow: bool = False
@@ -98,13 +94,13 @@ class Candidate:
             finer = dataclasses.replace(finer, previous_decrease=previous_decrease)
         assert solution.problem is not None
         along = error_along(solution, finer)
-        passive = passive_torque(solution.problem, solution.trajectory)
+        missed = missed_between_nodes(solution.problem, solution.trajectory)
         if tolerance.quantity is Quantity.COST:
             errors = _errors_of_cost(solution, finer, tolerance)
             narrow = may_be_narrow(solution.problem.ld.lagrangian)
-            return cls(solution, tolerance, finer, *errors, along, passive, narrow=narrow)
+            return cls(solution, tolerance, finer, *errors, along, missed, narrow=narrow)
         error = tolerance.measure(estimate_against(solution, finer, tolerance.frame))
-        return cls(solution, tolerance, finer, error, error, along, passive)
+        return cls(solution, tolerance, finer, error, error, along, missed)
 
     @property
     def within_tolerance(self) -> bool:
@@ -114,8 +110,8 @@ class Candidate:
 
     @property
     def is_carried(self) -> bool:
-        """Whether the integral along the curve is accurate, and passive torques are negligible."""
-        return self.along <= self._largest_along and self.passive_fraction <= NEGLIGIBLE_FRACTION
+        """Whether the integral along the curve is accurate, and equations hold between nodes."""
+        return self.along <= self._largest_along and self.largest_missed <= 1.0
 
     @property
     def is_trusted(self) -> bool:
@@ -130,9 +126,9 @@ class Candidate:
         return cost and bool(known <= 2 * least_error(self.solution))
 
     @property
-    def passive_fraction(self) -> float:
-        """Largest relative torque of a passive joint along the motion."""
-        return 0.0 if self.passive is None else self.passive.fraction
+    def largest_missed(self) -> float:
+        """The largest of `missed`; 0 without equations along the motion."""
+        return 0.0 if self.missed is None else float(self.missed.max())
 
     @property
     def difference(self) -> float:

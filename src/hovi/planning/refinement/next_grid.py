@@ -12,7 +12,6 @@ from hovi.planning.problem.tolerance import CURVE_TOLERANCE, Quantity
 from hovi.planning.refinement.candidate import Candidate, contributions
 from hovi.planning.refinement.error_estimate import FinerSolution, estimate_against
 from hovi.planning.refinement.hp_refinement import UNRESOLVED_MODES, Demand, decay, refined
-from hovi.planning.refinement.passive_torque import NEGLIGIBLE_FRACTION
 
 Array = npt.NDArray[np.float64]
 
@@ -31,11 +30,12 @@ def next_grid(candidate: Candidate) -> Grid:
     assert problem is not None
     if finer is None:
         return problem.grid.halved()
-    demands = [*_demands(candidate, finer), *_passive_demands(candidate)]
+    demands = [*_demands(candidate, finer), *_demands_of_equations(candidate)]
     rho = _decay(candidate, finer)
     error = np.inf if candidate.error_of_cost is None else candidate.error_of_cost
     decay_known = error <= MAX_ERROR_OF_DECAY
-    few_points = error <= CURVE_TOLERANCE  # with larger errors torques could hide between them
+    # with larger errors torques could hide between them; equations leave wrists free to spin there
+    few_points = error <= CURVE_TOLERANCE and not problem.along
     same_steps = np.array_equal(problem.grid.steps, finer.problem.grid.steps)
     # with all intervals halved, as under limits, its own estimate would need twice as many again
     usable = same_steps and (decay_known or finer.problem.grid.inner_modes <= UNRESOLVED_MODES)
@@ -76,12 +76,11 @@ def _demands(candidate: Candidate, finer: FinerSolution) -> list[Demand]:
     return _demands_on_curve(candidate, finer, known)
 
 
-def _passive_demands(candidate: Candidate) -> list[Demand]:
-    """The reduction of passive torques that each interval needs."""
-    if candidate.passive is None:
+def _demands_of_equations(candidate: Candidate) -> list[Demand]:
+    """The reduction of what equations are missed by that each interval needs."""
+    if candidate.missed is None:
         return []
-    target = TARGET_FRACTION * NEGLIGIBLE_FRACTION
-    return [Demand(target / np.maximum(candidate.passive.by_interval, 1e-300), 1)]
+    return [Demand(TARGET_FRACTION / np.maximum(candidate.missed, 1e-300), 1)]
 
 
 def _demands_on_curve(candidate: Candidate, finer: FinerSolution, known: Array) -> list[Demand]:

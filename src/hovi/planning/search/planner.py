@@ -24,6 +24,7 @@ from hovi.planning.problem.goals import Via
 from hovi.planning.problem.notation.ends import End, as_end
 from hovi.planning.problem.notation.goal_turns import says_turns, turns_sentence
 from hovi.planning.problem.notation.smoothing import smoothed
+from hovi.planning.problem.notation.supported import require_given_duration
 from hovi.planning.problem.presolve.assumptions import assumptions
 from hovi.planning.problem.presolve.findings import findings
 from hovi.planning.problem.presolve.length_slips import grasped_slips
@@ -244,6 +245,8 @@ def run(search: Search, began: float) -> Solution:
     """The best solution of a search, with its times. began: of the plan, by the clock."""
     for job in filter(None, (search.fine, search.without)):
         job.problem()  # outside of the deadline: every solution has its problem
+    if search.free is not None or (search.segments is not None and search.segments.any):
+        require_given_duration(search.fine.problem())
     started = time.perf_counter()
     with search.deadline.in_force():
         best, minima = search.run()

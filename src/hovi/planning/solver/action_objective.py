@@ -28,11 +28,10 @@ from hovi.optimize.kkt_model import KktModel
 from hovi.optimize.merge_tree import MergeTreeModel
 from hovi.optimize.quadratic_model import IntervalSum, QuadraticModel
 from hovi.optimize.trust_region import Objective
-from hovi.planning.conditions.condition import bend_at, linear_at
 from hovi.planning.problem.hessian_structure import ActionStructure
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.equations import Equations
-from hovi.planning.solver.multipliers import Multipliers, Residuals, node_residuals
+from hovi.planning.solver.multipliers import Multipliers, Residuals
 from hovi.scene.lagrangian import Lagrangian, PointTerms
 
 Array = npt.NDArray[np.float64]
@@ -143,9 +142,9 @@ class ActionObjective(Objective[DiscretePath]):
                     rho = self.multipliers.torque_penalty
                     value += 0.5 * rho * self.moments.squares(outputs[i], i)
         if self.multipliers is not None:
-            rho = self.multipliers.node_penalty
-            residuals = node_residuals(self.problem, x)
-            for mu, c in zip(self.multipliers.nodes, residuals, strict=True):
+            rho = self.multipliers.penalty
+            residuals = self.equations.conditions(x, self.jets(x))
+            for mu, c in zip(self.multipliers.conditions, residuals, strict=True):
                 value += float(mu @ c + 0.5 * rho * c @ c)
         return value
 
@@ -171,7 +170,7 @@ class ActionObjective(Objective[DiscretePath]):
             passive = [tau[:, self.problem.passive] for tau in torques]
         else:
             passive = [self.moments.projected(tau, i) for i, tau in enumerate(torques)]
-        return Residuals(passive, node_residuals(self.problem, x), largest)
+        return Residuals(passive, self.equations.conditions(x, self.jets(x)), largest)
 
     def _least_torque(self, x: DiscretePath) -> float:
         """Lower bound of the torque scale for residuals, in [N m]."""
@@ -231,16 +230,18 @@ class ActionObjective(Objective[DiscretePath]):
         add: adds further terms to the expansion.
         """
         multipliers = self.multipliers
+        jets = self.jets(x)
         if multipliers is not None:
             terms = self._with_moments(x, multipliers).added_to(terms)
-        jets = self.jets(x)
+            forces = multipliers.forced(self.equations.conditions(x, jets))
+            self.equations.add_to(terms, forces, jets)
         self._expansion = _expand(
             self.ld, x, self.coordinates, curvatures, terms, jets, self.keep_points
         )
         if add is not None:
             add(self._expansion)
         if multipliers is not None:
-            self._add_conditions(x, self._expansion, multipliers)
+            self.equations.add_penalty(x, self._expansion, jets, forces, multipliers.penalty)
             if self.moments is not None:
                 self.moments.add_squares(self._expansion, multipliers.torque_penalty)
         return self.model_of_expansion()
@@ -283,51 +284,37 @@ class ActionObjective(Objective[DiscretePath]):
         forces = [self._force(y, i) for i, y in enumerate(self.outputs(x))]
         return dataclasses.replace(multipliers, torque=forces)
 
-    def _add_conditions(self, x: DiscretePath, expansion: Expansion, known: Multipliers) -> None:
-        """Add the terms of the conditions to the intervals that contain their nodes."""
-        rho = known.node_penalty
-        for each, mu in zip(self.problem.equations, known.nodes, strict=True):
-            k, columns, scale = self.equations.place(each.where.node)
-            q, v = each.where.state(x)
-            c, J = linear_at(each, q, v)  # (s,), (s, 2, n)
-            force, flat = mu + rho * c, J.reshape(len(c), -1)
-            curvature = bend_at(each, q, v, force)
-            curvature += rho * (flat.T @ flat).reshape(curvature.shape)
-            expansion.gradient[k, columns] += (force @ flat).reshape(2, -1) * scale[:, None]
-            curvature *= scale[:, None, None, None] * scale[:, None]
-            expansion.hessian[k, columns, columns] += curvature.transpose(0, 2, 1, 3)
-
     def under_equations(self, x: DiscretePath, model: BandModel) -> EquationModel:
         """The last model, at x, whose Newton steps satisfy the equations to first order."""
         known, equations = self.multipliers, self.equations
         assert known is not None
-        rows = equations.rows(x, self.expansion)
+        rows = equations.rows(x, self.expansion, self.jets(x))
         layout, wide = equations.layout(rows)
         none, bands = np.zeros(len(layout.multipliers)), (self.structure.metric_band, wide)
         kkt = KktModel(model.intervals, rows, none, layout, *bands)
-        penalty = known.torque_penalty if len(self.problem.passive) > 0 else known.node_penalty
-        return EquationModel(model, kkt, equations.residual(x, self.outputs(x)), penalty)
+        penalty = known.torque_penalty if len(self.problem.passive) > 0 else known.penalty
+        residual = equations.residual(x, self.outputs(x), self.jets(x))
+        return EquationModel(model, kkt, residual, penalty)
 
     @cached_property
     def equations(self) -> Equations:
         """The equations, with one penalty for all."""
-        known = self.multipliers
-        assert known is not None
-        both = len(self.problem.passive) > 0
-        scale = math.sqrt(known.node_penalty / known.torque_penalty) if both else 1.0
+        known, scale = self.multipliers, 1.0
+        if known is not None and len(self.problem.passive) > 0:
+            scale = math.sqrt(known.penalty / known.torque_penalty)
         return Equations(self.problem, scale)
 
     def hold(self, x: DiscretePath, change: Array) -> float:
         """Add a change to the multipliers of equations; returns what it adds to the value at x."""
         known = self.multipliers
         assert known is not None
-        passive, (torque, nodes) = self.problem.passive, self.equations.split(change)
+        passive, (torque, others) = self.problem.passive, self.equations.split(change)
         forces = [force.copy() for force in known.torque]
         for force, more in zip(forces, torque, strict=False):  # none without passive joints
             force[:, passive] += more
-        added = [mu + more for mu, more in zip(known.nodes, nodes, strict=True)]
-        self.multipliers = dataclasses.replace(known, torque=forces, nodes=added)
-        return float(change @ self.equations.residual(x, self.outputs(x)))
+        added = [mu + more for mu, more in zip(known.conditions, others, strict=True)]
+        self.multipliers = dataclasses.replace(known, torque=forces, conditions=added)
+        return float(change @ self.equations.residual(x, self.outputs(x), self.jets(x)))
 
     def retract(self, x: DiscretePath, step: Array, model: QuadraticModel) -> DiscretePath:
         """The path moved by a step: nodes by `integrate`, everything else added."""

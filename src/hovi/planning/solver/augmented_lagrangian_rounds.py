@@ -9,7 +9,8 @@ import numpy as np
 
 from hovi.discrete.grid import DiscretePath
 from hovi.optimize.ended import Ended, Reason
-from hovi.planning.conditions.condition import Equation, describe, is_spurious, whose
+from hovi.planning.conditions.condition import describe, is_spurious, residual, whose
+from hovi.planning.conditions.missed_along import worst_along
 from hovi.planning.problem.conditions_of import passive_joints
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.action_objective import ActionObjective
@@ -21,8 +22,8 @@ WARM_TORQUE_FRACTION = 0.1
 """Passive torque of a guess, relative to the largest torque, up to which it counts as warm."""
 WARM_PENALTY_FACTOR = 1e3
 """Factor of the initial torque penalty for a warm guess."""
-INITIAL_NODE_PENALTY = 1e3
-"""Initial penalty of conditions at nodes, relative to the cost, per [rad^2] or [m^2]."""
+INITIAL_PENALTY = 1e3
+"""Initial penalty of conditions, relative to the cost, per [rad^2] or [m^2]."""
 PENALTY_GROWTH = 10.0
 """Factor by which a penalty grows if its residual decreases too slowly."""
 SLOW_DECREASE = 0.1
@@ -36,7 +37,7 @@ MAX_ROUNDS = 60
 """Maximum number of rounds."""
 TORQUE_TOLERANCE = 1e-10
 """Largest passive torque at convergence, relative to the largest torque."""
-NODE_TOLERANCE = 1e-11
+CONDITION_TOLERANCE = 1e-11
 """Largest residual of a condition at convergence, in [rad] or [m]."""
 FEASIBLE_RESIDUAL = 1e-6
 """Residual above which a problem counts as infeasible: relative for torques, else [rad] or [m]."""
@@ -71,13 +72,13 @@ def minimize_constrained(
         result = minimize(multipliers, path, decrease)
         path = result.x
         residuals = ActionObjective(problem, multipliers=multipliers).residuals(path)
-        sizes = residuals.torque_fraction, residuals.node_error
+        sizes = residuals.torque_fraction, residuals.condition_error
         if result.why is not Reason.STATIONARY or are_met(residuals):
             break
         slow = [
             size > max(SLOW_DECREASE * before, 0.1 * enough)
             for size, before, enough in zip(
-                sizes, last, (TORQUE_TOLERANCE, NODE_TOLERANCE), strict=True
+                sizes, last, (TORQUE_TOLERANCE, CONDITION_TOLERANCE), strict=True
             )
         ]
         stuck = [
@@ -93,39 +94,35 @@ def minimize_constrained(
         )
         decrease = float(np.clip(max(sizes) ** 2, 1e-12, FIRST_DECREASE))
         last = sizes
-    reason = ""
-    if result.why is Reason.STATIONARY and not within(
-        residuals, FEASIBLE_RESIDUAL, FEASIBLE_RESIDUAL
-    ):
-        reason = unmet_sentence(problem, path, residuals)
-    elif result.why is Reason.STATIONARY:
-        reason = spurious_sentence(problem, path)
-    return result, multipliers, reason
+    stationary = result.why is Reason.STATIONARY
+    return result, multipliers, unmet_sentence(problem, path, residuals) if stationary else ""
 
 
 def first_multipliers(problem: TrajectoryProblem, path: DiscretePath) -> Multipliers:
     """Zero multipliers, with penalties scaled by the torque weights and the cost of a path."""
     weight = problem.mean_output_weight
     cost = max(abs(problem.ld.action(path)), 1e-6)
-    zero = Multipliers.zero(problem, INITIAL_TORQUE_PENALTY * weight, INITIAL_NODE_PENALTY * cost)
-    fraction = ActionObjective(problem, multipliers=zero).residuals(path).torque_fraction
+    action = ActionObjective(problem)
+    penalties = INITIAL_TORQUE_PENALTY * weight, INITIAL_PENALTY * cost
+    zero = Multipliers.zero(problem, action.equations, *penalties)
+    fraction = action.residuals(path).torque_fraction
     warm = fraction <= WARM_TORQUE_FRACTION
     return zero.with_scaled_penalties(WARM_PENALTY_FACTOR, 1.0) if warm else zero
 
 
 def are_met(residuals: Residuals) -> bool:
     """Whether the constraints hold to their tolerances."""
-    return within(residuals, TORQUE_TOLERANCE, NODE_TOLERANCE)
+    return within(residuals, TORQUE_TOLERANCE, CONDITION_TOLERANCE)
 
 
-def within(residuals: Residuals, torque_fraction: float, node_error: float) -> bool:
-    """Whether passive torques and conditions at nodes are within these tolerances."""
-    return residuals.torque_fraction <= torque_fraction and residuals.node_error <= node_error
+def within(residuals: Residuals, torque_fraction: float, error: float) -> bool:
+    """Whether passive torques and conditions are within these tolerances."""
+    return residuals.torque_fraction <= torque_fraction and residuals.condition_error <= error
 
 
 def _at_maximum_penalty(now: Multipliers, first: Multipliers, slow: list[bool]) -> bool:
     """Whether a penalty that should grow has reached its maximum."""
-    grown = now.torque_penalty / first.torque_penalty, now.node_penalty / first.node_penalty
+    grown = now.torque_penalty / first.torque_penalty, now.penalty / first.penalty
     return any(each and size >= MAX_PENALTY_RATIO for each, size in zip(slow, grown, strict=True))
 
 
@@ -141,20 +138,22 @@ def spurious_sentence(problem: TrajectoryProblem, path: DiscretePath) -> str:
 
 
 def unmet_sentence(problem: TrajectoryProblem, path: DiscretePath, residuals: Residuals) -> str:
-    """Passive torques if they are too large, else the goal that is missed most, and what to do.
+    """Passive torques if they are too large, else what is missed most, or holds at a spurious root.
 
-    A sentence without its end.
+    A sentence without its end, with what to do; "" if the equations hold.
     """
-    if residuals.torque_fraction > FEASIBLE_RESIDUAL or not problem.equations:
+    if within(residuals, FEASIBLE_RESIDUAL, FEASIBLE_RESIDUAL):
+        return spurious_sentence(problem, path)
+    if residuals.torque_fraction > FEASIBLE_RESIDUAL or residuals.condition_error == 0.0:
         return (
             f"no motion was found with zero torque at passive joint {passive_joints(problem)}: the "
             f"remaining torque is {residuals.torque_fraction:.3g} of the largest; allow more time "
             "or change the goal"
         )
-    worst = _worst(problem, residuals)
+    name, missed = _worst(problem, path)
     return (
-        f"{whose(worst)} at t = {worst.where.time:.4g} s cannot be met: {describe(worst, path)}; "
-        "change the goal, increase the duration or try another initial guess"
+        f"{name} cannot be met: {missed}; change the goal, increase the duration or try another "
+        "initial guess"
     )
 
 
@@ -163,15 +162,18 @@ def missed_sentence(problem: TrajectoryProblem, path: DiscretePath) -> str:
     residuals = ActionObjective(problem).residuals(path)
     if within(residuals, FEASIBLE_RESIDUAL, FEASIBLE_RESIDUAL):
         return ""
-    if residuals.torque_fraction > FEASIBLE_RESIDUAL or not problem.equations:
+    if residuals.torque_fraction > FEASIBLE_RESIDUAL or residuals.condition_error == 0.0:
         fraction, joint = residuals.torque_fraction, passive_joints(problem)
         return f" So far, the torque at passive joint {joint} is {fraction:.3g} of the largest."
-    worst = _worst(problem, residuals)
-    where = f"{whose(worst)} at t = {worst.where.time:.4g} s"
-    return f" So far, {where} is missed: {describe(worst, path)}."
+    name, missed = _worst(problem, path)
+    return f" So far, {name} is missed: {missed}."
 
 
-def _worst(problem: TrajectoryProblem, residuals: Residuals) -> Equation:
-    """The condition at a node that is missed most."""
-    sizes = [float(np.max(np.abs(c), initial=0.0)) for c in residuals.nodes]
-    return problem.equations[int(np.argmax(sizes))]
+def _worst(problem: TrajectoryProblem, path: DiscretePath) -> tuple[str, str]:
+    """The condition that is missed most, a subject, and by how much, a clause."""
+    sizes = [float(np.max(np.abs(residual(each, path)))) for each in problem.equations]
+    if max(sizes, default=0.0) > FEASIBLE_RESIDUAL:
+        worst = problem.equations[int(np.argmax(sizes))]
+        return f"{whose(worst)} at t = {worst.where.time:.4g} s", describe(worst, path)
+    along = worst_along(problem.along, problem.trajectory(path))
+    return along.subject, along.clause

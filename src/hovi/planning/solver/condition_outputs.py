@@ -72,8 +72,8 @@ class ConditionOutputs(PointOutputs):
             own = force[:, first : first + each.y.size] / scale
             first += each.y.size
             dy = each.y.slopes(at)
-            slopes.append(_total(dy, J, each.y.size, at) / scale[:, None])
-            _add_curvature(curvature, each.y.curvature(at, own), J)
+            slopes.append(jet_slopes(dy, J, each.y.size, at) / scale[:, None])
+            add_curvature(curvature, each.y.curvature(at, own), J)
             if "tau" in dy:
                 torques += np.matmul(own[:, None], dy["tau"])[:, 0]
         return ExpandedOutputs(np.concatenate(slopes, axis=1), curvature, torques)
@@ -91,8 +91,11 @@ class ConditionOutputs(PointOutputs):
         return np.concatenate(parts)[:, :n]
 
 
-def _total(dy: Slopes, J: Array | None, size: int, at: Points) -> Array:
-    """dy / d(q, v, a) with what comes through the torques, (P, size, 3 nv)."""
+def jet_slopes(dy: Slopes, J: Array | None, size: int, at: Points) -> Array:
+    """dy / d(q, v, a) with what comes through the torques, (P, size, 3 nv).
+
+    J: d tau / d(q, v, a), (P, nv, 3 nv); None where y depends on no torques.
+    """
     n = at.v.shape[1]
     total = np.zeros((len(at.q), size, 3 * n))
     for x, slope in dy.items():
@@ -104,8 +107,8 @@ def _total(dy: Slopes, J: Array | None, size: int, at: Points) -> Array:
     return total
 
 
-def _add_curvature(total: Array, parts: Curvature, J: Array | None) -> None:
-    """Add weighted second derivatives in (q, v, a), torques included, in place."""
+def add_curvature(total: Array, parts: Curvature, J: Array | None) -> None:
+    """Add weighted second derivatives in (q, v, a), torques included, in place; J: as above."""
     n = total.shape[1] // 3
     for (x, z), block in parts.items():
         if "tau" not in (x, z):

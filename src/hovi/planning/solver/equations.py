@@ -1,21 +1,26 @@
-"""The equations c = 0 of a problem: moments of passive torques, then conditions at nodes.
+"""The equations c = 0 of a problem: moments of passive torques, then conditions.
 
-Those of passive torques are sqrt(h) m_j, see TorqueMoments; conditions at nodes are scaled such
-that one weight of |c|^2 suits both.
+Those of passive torques are sqrt(h) m_j, see TorqueMoments; conditions, along the motion and at
+nodes, are scaled such that one weight of |c|^2 suits both.
 """
 
 from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
 
 from hovi.discrete.contraction import Expansion
 from hovi.discrete.grid import DiscretePath
+from hovi.discrete.interval_batch import Jet
 from hovi.optimize.kkt_model import ConstraintRows, KktLayout
-from hovi.planning.conditions.condition import linear_at
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.problem.torque_moments import TorqueMoments
-from hovi.planning.solver.multipliers import node_residuals
+from hovi.planning.solver.along_moments import AlongMoments
+from hovi.planning.solver.node_equations import NodeEquations
+from hovi.scene.lagrangian import PointTerms
 
 Array = npt.NDArray[np.float64]
 
@@ -23,25 +28,39 @@ Array = npt.NDArray[np.float64]
 class Equations:
     """The equations of a problem as rows of its intervals.
 
-    node_scale: factor of conditions at nodes.
+    scale: factor of those that are no moments of torques.
     """
 
-    def __init__(self, problem: TrajectoryProblem, node_scale: float) -> None:
-        self.problem, self.node_scale = problem, node_scale
+    def __init__(self, problem: TrajectoryProblem, scale: float) -> None:
+        self.problem, self.scale = problem, scale
         passive = problem.passive
         self.moments = TorqueMoments.everywhere(problem.ld, passive) if len(passive) > 0 else None
         self.passive_joints = _joints_of(problem) if len(passive) > 0 else passive
+        self.along = [AlongMoments(problem, each) for each in problem.along]
+        self.at_nodes = NodeEquations.of(problem.equations, problem.grid)
         self._known: tuple[KktLayout, Array] | None = None
 
-    def residual(self, x: DiscretePath, outputs: list[Array]) -> Array:
-        """c at a path, with the Lagrangian's outputs at its points."""
-        parts = [self.node_scale * c for c in node_residuals(self.problem, x)]
+    @property
+    def sizes(self) -> list[int]:
+        """The sizes of `conditions`."""
+        return [*(each.size for each in self.along), *(each.size for each in self.at_nodes)]
+
+    def residual(self, x: DiscretePath, outputs: list[Array], jets: Sequence[Jet]) -> Array:
+        """c at a path, with the Lagrangian's outputs and (q, v, a) at its points."""
+        parts = [self.scale * c for c in self.conditions(x, jets)]
         if self.moments is not None:
             scaled = self.moments.scaled
             parts = [*(scaled(tau, i) for i, tau in enumerate(outputs)), *parts]
         return np.concatenate(parts)
 
-    def rows(self, x: DiscretePath, expansion: Expansion) -> list[ConstraintRows]:
+    def conditions(self, x: DiscretePath, jets: Sequence[Jet]) -> list[Array]:
+        """c of the conditions: of each along the motion in its intervals, then at nodes."""
+        along = [each.residual(jets) for each in self.along]
+        return [*along, *(each.residual(x) for each in self.at_nodes)]
+
+    def rows(
+        self, x: DiscretePath, expansion: Expansion, jets: Sequence[Jet]
+    ) -> list[ConstraintRows]:
         """Their Jacobian in nodal columns; expansion: of a discrete Lagrangian at the path.
 
         Those of each passive joint, and those of all conditions, are a family.
@@ -52,20 +71,16 @@ class Equations:
                 slopes = self.moments.scaled_slopes(expansion, i)
                 families = np.resize(self.passive_joints, slopes.shape[1])
                 rows.append(ConstraintRows(batch.index, slopes, families))
-        for each in self.problem.equations:
-            k, columns, scale = self.place(each.where.node)
-            _, J = linear_at(each, *each.where.state(x))  # (s, 2, n)
-            slopes = np.zeros((1, len(J), columns.stop, J.shape[2]))
-            slopes[0, :, columns] = self.node_scale * scale[:, None] * J
-            rows.append(ConstraintRows(np.array([k]), slopes))
+        for each in itertools.chain(*self.condition_rows(x, expansion, jets)):
+            rows.append(ConstraintRows(each.index, self.scale * each.slopes))
         return rows
 
-    def place(self, node: int) -> tuple[int, slice, Array]:
-        """An interval that contains a node, the columns of its (q, h v), and their scales."""
-        grid = self.problem.grid
-        k = min(node, grid.intervals - 1)
-        first = 0 if node == k else grid.order
-        return k, slice(first, first + 2), np.array([1.0, 1.0 / grid.steps[k]])
+    def condition_rows(
+        self, x: DiscretePath, expansion: Expansion, jets: Sequence[Jet]
+    ) -> list[list[ConstraintRows]]:
+        """The rows of `conditions`, without the scale."""
+        along = [each.rows(jets, expansion) for each in self.along]
+        return [*along, *([each.rows(x)] for each in self.at_nodes)]
 
     def layout(self, rows: list[ConstraintRows]) -> tuple[KktLayout, Array]:
         """The layout of the KKT matrix, and the metric in it, which all paths have in common."""
@@ -76,18 +91,52 @@ class Equations:
         return self._known
 
     def split(self, y: Array) -> tuple[list[Array], list[Array]]:
-        """Multipliers as lambda of passive joints at the points per batch, and mu of conditions."""
-        torque, nodes, first = [], [], 0
+        """Multipliers as lambda of passive joints at the points per batch, and of conditions."""
+        torque, first = [], 0
         if self.moments is not None:
             for i in range(len(self.moments.batches)):
                 last = first + self.moments.size(i)
                 torque.append(self.moments.spread(y[first:last], i))
                 first = last
-        for each in self.problem.equations:
-            last = first + each.y.size
-            nodes.append(self.node_scale * y[first:last])
-            first = last
-        return torque, nodes
+        ends = first + np.cumsum([0, *self.sizes])
+        return torque, [self.scale * y[a:b] for a, b in itertools.pairwise(ends)]
+
+    def add_to(self, terms: list[PointTerms], of: list[Array], jets: Sequence[Jet]) -> None:
+        """Add the forces of conditions along the motion, with their multipliers, in place."""
+        for each, multipliers in zip(self.along, of, strict=False):
+            for i, gradient, curvature in each.terms(jets, multipliers):
+                terms[i] = terms[i].plus(gradient, curvature)
+
+    def add_penalty(
+        self,
+        x: DiscretePath,
+        expansion: Expansion,
+        jets: Sequence[Jet],
+        forces: list[Array],
+        penalty: float,
+    ) -> None:
+        """Add conditions c with the terms mu c + penalty c^2 / 2 to an expansion, in place.
+
+        forces: mu + penalty c. Those of `add_to` are in the expansion already.
+        """
+        known = self.condition_rows(x, expansion, jets)
+        for number, (rows, force) in enumerate(zip(known, forces, strict=True)):
+            first = 0
+            for each in rows:
+                B, _, m, n = each.slopes.shape
+                product = np.matmul(each.flat.transpose(0, 2, 1), penalty * each.flat)
+                blocks = product.reshape(B, m, n, m, n).transpose(0, 1, 3, 2, 4)
+                expansion.hessian[each.index, :m, :m] += blocks
+                if number >= len(self.along):
+                    own = each.weighted(force[first : first + each.size])
+                    expansion.gradient[each.index, :m] += own
+                first += each.size
+        self.add_curvature(x, forces, expansion.hessian)
+
+    def add_curvature(self, x: DiscretePath, of: list[Array], hessian: Array) -> None:
+        """Add the curvature of conditions at nodes to Hessians of the intervals, in place."""
+        for each, multipliers in zip(self.at_nodes, of[len(self.along) :], strict=True):
+            each.add_curvature(x, multipliers, hessian)
 
 
 def _joints_of(problem: TrajectoryProblem) -> npt.NDArray[np.intp]:

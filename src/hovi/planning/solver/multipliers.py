@@ -1,7 +1,7 @@
 """Multipliers and penalties of the equality constraints: an augmented Lagrangian.
 
-For the constraints tau = 0 of passive joints at the quadrature points, with weights w, and c = 0
-at nodes, the action is replaced by
+For the constraints tau = 0 of passive joints at the quadrature points, with weights w, and the
+conditions c = 0, the action is replaced by
 
     action + sum w (lambda tau + rho tau^2/2) + sum (mu c + rho c^2/2).
 
@@ -17,9 +17,8 @@ import dataclasses
 import numpy as np
 import numpy.typing as npt
 
-from hovi.discrete.grid import DiscretePath
-from hovi.planning.conditions.condition import residual
 from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.solver.equations import Equations
 from hovi.scene.lagrangian import PointTerms
 from hovi.system.dataclass import dataclass
 
@@ -31,12 +30,12 @@ class Residuals:
     """Residuals of the equality constraints.
 
     torque: of the passive joints at the quadrature points, (P, passive) per batch, in [N m].
-    nodes: c of every condition, shape (k,) each. largest_torque: of any joint at any point, in
-        [N m], bounded below where torques are rounding errors.
+    conditions: c, see `Equations.conditions`. largest_torque: of any joint at any point, in [N m],
+        bounded below where torques are rounding errors.
     """
 
     torque: list[Array]
-    nodes: list[Array]
+    conditions: list[Array]
     largest_torque: float
 
     @property
@@ -46,9 +45,9 @@ class Residuals:
         return passive / max(self.largest_torque, 1e-300)
 
     @property
-    def node_error(self) -> float:
+    def condition_error(self) -> float:
         """The largest component of a condition, in [m] or [rad]."""
-        return max((float(np.max(np.abs(c), initial=0.0)) for c in self.nodes), default=0.0)
+        return max((float(np.max(np.abs(c), initial=0.0)) for c in self.conditions), default=0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,35 +55,44 @@ class Multipliers:
     """The multipliers lambda and mu, and their penalties.
 
     torque: lambda of every joint at the quadrature points, (P, nv) per batch, zero where a joint
-        is not passive. nodes: mu of every condition.
-    torque_penalty, node_penalty: rho. jet_size: numbers (k+1) nv of the jet at a point.
+        is not passive. conditions: mu, see `Equations.conditions`.
+    torque_penalty, penalty: rho of torques and of conditions. jet_size: numbers (k+1) nv of the jet
+        at a point.
     """
 
     torque: list[Array]
-    nodes: list[Array]
+    conditions: list[Array]
     torque_penalty: float
-    node_penalty: float
+    penalty: float
     jet_size: int
 
     @classmethod
     def zero(
-        cls, problem: TrajectoryProblem, torque_penalty: float, node_penalty: float
+        cls,
+        problem: TrajectoryProblem,
+        equations: Equations,
+        torque_penalty: float,
+        penalty: float,
     ) -> Multipliers:
-        """Zero multipliers with given penalties."""
+        """Zero multipliers with given penalties. equations: of the problem."""
         lagrangian = problem.ld.lagrangian
         outputs = len(lagrangian.output_weight)
         torque = [np.zeros((len(t), outputs)) for t in problem.ld.point_times]
-        nodes = [np.zeros(each.y.size) for each in problem.equations]
+        conditions = [np.zeros(size) for size in equations.sizes]
         jet_size = (lagrangian.order + 1) * lagrangian.nv
-        return cls(torque, nodes, torque_penalty, node_penalty, jet_size)
+        return cls(torque, conditions, torque_penalty, penalty, jet_size)
 
     def updated(self, residuals: Residuals, passive: npt.NDArray[np.intp]) -> Multipliers:
         """lambda + rho c, the first-order estimate of the multipliers."""
         torques = zip(self.torque, residuals.torque, strict=True)
         torque = [self.plus_penalty(force, tau, passive) for force, tau in torques]
-        pairs = zip(self.nodes, residuals.nodes, strict=True)
-        nodes = [mu + self.node_penalty * c for mu, c in pairs]
-        return dataclasses.replace(self, torque=torque, nodes=nodes)
+        return dataclasses.replace(
+            self, torque=torque, conditions=self.forced(residuals.conditions)
+        )
+
+    def forced(self, c: list[Array]) -> list[Array]:
+        """mu + rho c of the conditions."""
+        return [mu + self.penalty * each for mu, each in zip(self.conditions, c, strict=True)]
 
     def plus_penalty(self, force: Array, tau: Array, passive: npt.NDArray[np.intp]) -> Array:
         """A force at points (P, nv) plus rho tau of the passive joints (P, passive)."""
@@ -106,15 +114,10 @@ class Multipliers:
             for term, force in zip(terms, self.torque, strict=True)
         ]
 
-    def with_scaled_penalties(self, torque: float, node: float) -> Multipliers:
+    def with_scaled_penalties(self, torque: float, conditions: float) -> Multipliers:
         """The same multipliers with penalties scaled by the given factors."""
         return dataclasses.replace(
             self,
             torque_penalty=self.torque_penalty * torque,
-            node_penalty=self.node_penalty * node,
+            penalty=self.penalty * conditions,
         )
-
-
-def node_residuals(problem: TrajectoryProblem, x: DiscretePath) -> list[Array]:
-    """c of every condition at a path."""
-    return [residual(each, x) for each in problem.equations]

@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from hovi.discrete.state import Periodic
 from hovi.errors import InputError
 from hovi.planning.conditions.asked import as_conditions, need_torques
 from hovi.planning.conditions.condition import Equation
+from hovi.planning.conditions.places import Along
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.notation.summaries import ProblemSummary
 from hovi.scene.scene import require_plannable
@@ -33,6 +35,14 @@ def require_supported(problem: ProblemSummary, order: int) -> None:
             f"{' and '.join(named)} need a Lagrangian of order 2 or 3, and this one is of order "
             f"{order}: leave them out."
         )
+    for each in problem.conditions:
+        periodic = isinstance(problem.goal, Periodic)
+        if isinstance(each.where, Along) and (order != 2 or periodic):
+            what = "a periodic motion" if periodic else f"a cost of order {order}"
+            raise InputError(
+                f"condition {each.name!r} is an equation at all times, which {what} does not "
+                "support: leave it out, use hovi.AtTimes, or a hovi.Between with some room."
+            )
     if limits is not None:
         limits.require_order(order)
     if need_torques(problem.bounds) and not problem.scenes:
@@ -52,6 +62,17 @@ def require_free(asked: Sequence[Equation], problem: Any) -> None:
             raise InputError(
                 f"condition {each.name!r} is asked at t = {each.where.time:g} s {what}: leave it "
                 "out, or leave something free there."
+            )
+
+
+def require_given_duration(problem: Any) -> None:
+    """Raise InputError for equations at all times that other durations would change."""
+    for each in problem.along:
+        if each.where.level > 0 or each.timed:
+            what = "time" if each.timed else ("velocities", "accelerations")[each.where.level - 1]
+            raise InputError(
+                f"condition {each.name!r} is an equation of {what} at all times, which needs a "
+                "given duration: give it as one number."
             )
 
 

@@ -6,8 +6,9 @@ import numpy as np
 
 from hovi.discrete.curve_integral import integral_along
 from hovi.discrete.trajectory import Trajectory
+from hovi.planning.conditions.missed_along import worst_along
 from hovi.planning.problem.problem import TrajectoryProblem
-from hovi.planning.refinement.passive_torque import NEGLIGIBLE_FRACTION, passive_torque
+from hovi.planning.refinement.between_nodes import NEGLIGIBLE_FRACTION, passive_torque
 from hovi.planning.solver.outcome.cost_with_time import cost_of, price_of_time
 from hovi.planning.solver.solver import Solution
 from hovi.schemes import is_galerkin
@@ -17,7 +18,7 @@ RESOLVED = 0.01
 
 
 def fault_on_curve(solution: Solution) -> str:
-    """What differs between the points and the curve, the cost or passive torques; "" if none does.
+    """What differs between the points and the curve, the cost or an equation; "" if none does.
 
     Of Galerkin tables, whose curve is their own.
     """
@@ -25,17 +26,17 @@ def fault_on_curve(solution: Solution) -> str:
     assert problem is not None
     if not has_own_curve(problem):
         return ""
-    return _fault_of_integral(solution, problem) or _fault_of_passive(problem, trajectory)
+    return _fault_of_integral(solution, problem) or _fault_of_equations(problem, trajectory)
 
 
 def difference_on_curve(solution: Solution) -> float:
     """The relative difference of the cost at the points and along the curve.
 
-    0 without a curve of its own, infinite with passive joints, whose torques are looked at anew.
+    0 without a curve of its own, infinite with equations along it, which are looked at anew.
     """
     problem = solution.problem
     assert problem is not None
-    if len(problem.passive) > 0:
+    if len(problem.passive) > 0 or problem.along:
         return np.inf
     if not has_own_curve(problem):
         return 0.0
@@ -97,8 +98,12 @@ def costs_nothing(solution: Solution) -> bool:
     return known and abs(solution.cost) <= RESOLVED * solution.problem.negligible_cost
 
 
-def _fault_of_passive(problem: TrajectoryProblem, trajectory: Trajectory) -> str:
-    """The torque of a passive joint between the points; "" if it is negligible."""
+def _fault_of_equations(problem: TrajectoryProblem, trajectory: Trajectory) -> str:
+    """An equation that is missed between the nodes, or the torque of a passive joint; or ""."""
+    if problem.along:
+        worst = worst_along(problem.along, trajectory)
+        if worst.clause:
+            return f"{worst.subject} does not hold between the nodes: {worst.clause}"
     found = passive_torque(problem, trajectory)
     if found is None or found.fraction <= NEGLIGIBLE_FRACTION:
         return ""

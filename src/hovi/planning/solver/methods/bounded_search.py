@@ -33,11 +33,11 @@ from hovi.planning.problem.presolve.end_torques import static_sentence
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.action_objective import LinearAlgebra
 from hovi.planning.solver.augmented_lagrangian_rounds import (
-    NODE_TOLERANCE,
+    CONDITION_TOLERANCE,
     TORQUE_TOLERANCE,
     first_multipliers,
     minimize_constrained,
-    spurious_sentence,
+    unmet_sentence,
 )
 from hovi.planning.solver.bounded_action import BoundedAction
 from hovi.planning.solver.central_path import CentralPath
@@ -68,7 +68,7 @@ WARM_MU_RANGE = 1e-7, 1e-4
 """Range of the initial barrier parameter of a warm start, relative to the mean density."""
 LEVEL_MARGIN = 0.1
 """Distance of slacks from their bounds at a point of a central path, relative to its parameter."""
-EXACT_TOLERANCES = TORQUE_TOLERANCE, NODE_TOLERANCE
+EXACT_TOLERANCES = TORQUE_TOLERANCE, CONDITION_TOLERANCE
 """Residuals of equations at the end of a solve: see BoundedAction."""
 ROUGH_TOLERANCES = np.inf, 1e-4
 """The same for a rough solve."""
@@ -209,7 +209,7 @@ class BoundedSearch:
         apart = self.problem.distances is None or (self.near is not None and self.near.size == 0)
         barrier = ended.z if apart else None
         known = None if len(self.problem.passive) > 0 else self.multipliers
-        conditions = None if known is None else tuple(known.nodes)
+        conditions = None if known is None else tuple(known.conditions)
         return CentralPath(points, self.rows, barrier, self.near, conditions)
 
     def _add_points(self, ended: Bounded, objective: BoundedAction) -> None:
@@ -240,10 +240,7 @@ class BoundedSearch:
         if not self.problem.constrained:
             return self.minimized(self.objective(None), start, self.remaining_criteria())
         if len(self.problem.passive) == 0:
-            found = self._solved_under_equations(start)
-            if found is not None:
-                return found
-
+            return self._solved_under_equations(start)
         z = start.z
 
         def minimize_round(known: Multipliers, x: DiscretePath, decrease: float) -> Bounded:
@@ -292,17 +289,15 @@ class BoundedSearch:
         z = Barrier.central(objective.bounds, outputs.y, level * density, scale, margin)
         return Start(path, z)
 
-    def _solved_under_equations(self, start: Begun) -> Bounded | None:
-        """A solve whose steps satisfy the conditions at nodes; None where that fails."""
+    def _solved_under_equations(self, start: Begun) -> Bounded:
+        """A solve whose steps satisfy conditions."""
         known = self.known_multipliers(start.x)
         objective = self.objective(known, tolerances=EXACT_TOLERANCES)
         ended = self.minimized(objective, start, self.remaining_criteria())
-        satisfied = objective.satisfies_equations(ended.x)
-        if ended.why is Reason.DIVERGED or (ended.why is Reason.STATIONARY and not satisfied):
-            return None
         self.multipliers = objective.action.multipliers
-        spurious = ended.why is Reason.STATIONARY
-        self.unmet = spurious_sentence(self.problem, ended.x) if spurious else ""
+        self.unmet = ""
+        if ended.why is Reason.STATIONARY:
+            self.unmet = unmet_sentence(self.problem, ended.x, objective.action.residuals(ended.x))
         return ended
 
     def known_multipliers(self, path: DiscretePath) -> Multipliers | None:

@@ -101,8 +101,8 @@ def _adopt(search: BoundedSearch, along: CentralPath) -> None:
         search.near = along.near.on(search.problem)
     if along.conditions is not None:
         known = first_multipliers(search.problem, along.last)
-        if [len(each) for each in known.nodes] == [len(each) for each in along.conditions]:
-            search.multipliers = dataclasses.replace(known, nodes=list(along.conditions))
+        if [len(each) for each in known.conditions] == [len(each) for each in along.conditions]:
+            search.multipliers = dataclasses.replace(known, conditions=list(along.conditions))
 
 
 def _followed(search: BoundedSearch, along: CentralPath) -> Bounded | None:

@@ -67,7 +67,7 @@ def _minimized(
 ) -> Ended[DiscretePath, Array]:
     """The end of Newton's method, with the steps that led to where it began."""
     deadline, begin = Deadline(criteria.time_limit), Start(start.x, _multipliers(start, objective))
-    if begin.z is not None or len(objective.problem.passive) > 0:
+    if begin.z is not None or objective.problem.along or len(objective.problem.passive) > 0:
         return minimize_under_equations(objective, begin, criteria, report)
     first, known = _with_penalty(objective, start, criteria, report)
     if first.why is Reason.STATIONARY:
@@ -125,14 +125,12 @@ def _with_penalty(
 ) -> tuple[Ended[DiscretePath, None], Array]:
     """A motion near a minimum, where equations at nodes hold nearly, and its multipliers."""
     problem = objective.problem
-    known = dataclasses.replace(
-        first_multipliers(problem, start.x), node_penalty=objective.node_penalty
-    )
+    known = dataclasses.replace(first_multipliers(problem, start.x), penalty=objective.penalty)
     penalized = ActionObjective(problem, multipliers=known)
     rough = dataclasses.replace(criteria, decrease=FIRST_DECREASE)
     ended = minimize(penalized, Start(start.x), rough, report)
     updated = known.updated(penalized.residuals(ended.x), problem.passive)
-    return ended, objective.of_nodes(updated)
+    return ended, objective.of_conditions(updated)
 
 
 def _with_offset(report: Report | None, done: int) -> Report | None:

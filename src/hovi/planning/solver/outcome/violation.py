@@ -13,6 +13,7 @@ from hovi.planning.clearance.clearance_violation import (
 )
 from hovi.planning.conditions.condition import Condition, missed, whose
 from hovi.planning.conditions.excess import excess_of, worst
+from hovi.planning.conditions.missed_along import worst_along
 from hovi.planning.conditions.pair_distances import PairDistances
 from hovi.planning.conditions.places import Along, AtNode, AtPoints, ControlPoints, Exchange
 from hovi.planning.problem.conditions_of import conditions_of
@@ -79,8 +80,11 @@ def _by_approaches(
     return approach_sentence(motion, near, approach_along(motion, near, margin), margin)
 
 
-def _by_moments(given: Condition[Any, Any], motion: Trajectory, problem: TrajectoryProblem) -> str:
-    """By moments of an interval, or values at its points, relative to the largest torque."""
+def _along(given: Condition[Any, Any], motion: Trajectory, problem: TrajectoryProblem) -> str:
+    """By samples; torques of passive joints by moments, relative to the largest torque."""
+    if "tau" not in given.y.needs:
+        found = worst_along([given], motion)
+        return found.clause and f"{found.subject} is violated: {found.clause}"
     fraction = ActionObjective(problem).residuals(motion.path).torque_fraction
     if fraction <= given.tolerance:
         return ""
@@ -92,6 +96,6 @@ VIOLATIONS: dict[type, Violation] = {
     AtPoints: _at_all_times,
     ControlPoints: _by_control_points,
     Exchange: _by_approaches,
-    Along: _by_moments,
+    Along: _along,
 }
 """How a violation is found, by where a condition holds."""

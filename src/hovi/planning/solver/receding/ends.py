@@ -40,8 +40,8 @@ KEPT_OPTIONS = (
 )
 """Options of `plan` that `replan` and `advance` keep, or have no use for."""
 ROOM = 5e-7
-"""Distance of a start from a limit that it is at, as a fraction of the range: without any there
-would be no motion strictly within the limits."""
+"""Distance of a start from a limit that it is at, as a fraction of the range or of 1 rad, m, rad/s
+or m/s: without any there would be no motion strictly within the limits."""
 
 
 def is_near(goal: FrameGoal, problem: TrajectoryProblem, path: DiscretePath) -> bool:
@@ -134,7 +134,7 @@ def turned(state: State, on: Coordinates, near: Array) -> State:
 
 
 def inside_limits(state: State, problem: TrajectoryProblem) -> State:
-    """A state that is at limits to their tolerance, with room between it and them.
+    """A state that is at limits nearly, with room between it and them, moved by 1e-6 at most.
 
     Others are left as they are: they may be outside the limits.
     """
@@ -146,9 +146,9 @@ def inside_limits(state: State, problem: TrajectoryProblem) -> State:
     for row, key in enumerate(("q", "v", "a")[: problem.ld.k]):
         if row == 0 and not on.vector_joints:
             continue
-        x, room = given[row], ROOM * limits.ranges[row]
+        x, room = given[row], ROOM * np.minimum(limits.ranges[row], 1.0)
         low, high = first.lower[row] + room, first.upper[row] - room
-        near = np.where(limits.bounded[row], (1.0 + limits.tolerance / ROOM) * room, 0.0)
+        near = np.where(limits.bounded[row], 2.0 * room, 0.0)
         inside = np.clip(x, low, high)
         moved[key] = np.where(np.abs(inside - x) <= near, inside, x)
     return dataclasses.replace(state, **moved)

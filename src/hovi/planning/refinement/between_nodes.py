@@ -1,4 +1,4 @@
-"""Torque of passive joints between the points at which, or the moments in which, it vanishes."""
+"""What a motion misses of equations along it between the nodes, where grids do not impose them."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from hovi.discrete.measures.motion_error import sample_points
 from hovi.discrete.trajectory import Trajectory
+from hovi.planning.conditions.missed_along import missed_along
 from hovi.planning.problem.problem import TrajectoryProblem
 
 Array = npt.NDArray[np.float64]
@@ -53,3 +54,15 @@ def passive_torque(problem: TrajectoryProblem, trajectory: Trajectory) -> Passiv
     worst = int(passive[np.argmax(tau[:, passive].max(axis=0))])
     name = trajectory.coordinate_names[worst]
     return PassiveTorque(by_interval / largest, name, float(tau[:, worst].max()), largest)
+
+
+def missed_between_nodes(problem: TrajectoryProblem, trajectory: Trajectory) -> Array | None:
+    """What equations along a motion are missed by in each interval, relative to what is accepted.
+
+    Shape (N,); None without any.
+    """
+    found = [each.by_interval for each in missed_along(problem.along, trajectory)]
+    passive = passive_torque(problem, trajectory)
+    if passive is not None:
+        found.append(passive.by_interval / NEGLIGIBLE_FRACTION)
+    return np.max(found, axis=0) if found else None

@@ -1,0 +1,95 @@
+"""Equations along a motion in its intervals: moments of their values.
+
+For a function y of level l, r + l moments of an interval with r inner modes,
+
+    m_j = h^l integral of P_j(s) (y(s) - value) ds over [0, 1], j = 0 .. r + l - 1,
+
+by the quadrature of its table, with orthonormal shifted Legendre polynomials P_j. With the k - l
+conditions at every node they are as many as a curve has unknowns.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi.checks.arguments import without_checks
+from hovi.discrete.contraction import Expansion
+from hovi.discrete.interval_batch import Jet
+from hovi.optimize.kkt_model import ConstraintRows
+from hovi.planning.conditions.condition import EquationAlong
+from hovi.planning.conditions.function import Points
+from hovi.planning.problem.interval_moments import IntervalMoments
+from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.solver.condition_outputs import add_curvature, jet_slopes
+
+Array = npt.NDArray[np.float64]
+
+_new_points = without_checks(Points)  # called at each step
+
+
+class AlongMoments:
+    """The moments of one equation on the grid of a problem."""
+
+    def __init__(self, problem: TrajectoryProblem, given: EquationAlong) -> None:
+        self._given, self._ld = given, problem.ld
+        level = given.where.level
+        degrees = (
+            (i, batch, batch.modes + level) for i, batch in enumerate(problem.ld.interval_batches)
+        )
+        self._parts = [
+            (i, IntervalMoments.of_degree(batch, below), batch.h[:, None, None] ** level)
+            for i, batch, below in degrees
+            if below > 0  # else the conditions at the nodes are all
+        ]
+
+    @property
+    def size(self) -> int:
+        """Number of moments."""
+        counts = (len(each.batch.h) * len(each.tests) for _, each, _ in self._parts)
+        return self._given.y.size * sum(counts)
+
+    def residual(self, jets: Sequence[Jet]) -> Array:
+        """m_j, flat. jets: (q, v, a) at the quadrature points, per batch."""
+        found = np.zeros(0)
+        for i, moments, power in self._parts:
+            missed = self._given.on.missed(self._given.y.values(self._points(jets, i)))
+            found = np.append(found, power * moments.of(missed))
+        return found
+
+    def rows(self, jets: Sequence[Jet], expansion: Expansion) -> list[ConstraintRows]:
+        """Their derivatives in nodal columns, per batch. expansion: at the same path."""
+        found = []
+        for i, moments, power in self._parts:
+            slopes = moments.slopes(self._slopes(jets, i), expansion.charts_of(i))
+            h = moments.batch.h[:, None, None]
+            found.append(ConstraintRows(moments.batch.index, slopes * (power / h)[..., None]))
+        return found
+
+    def terms(self, jets: Sequence[Jet], multipliers: Array) -> Iterator[tuple[int, Array, Array]]:
+        """A batch, and gradient (P, 3 nv) and curvature (P, 3 nv, 3 nv) in (q, v, a) at its points.
+
+        Those of a Lagrangian whose action is sum of multipliers m_j, with their flat multipliers.
+        """
+        first, size = 0, self._given.y.size
+        for i, moments, power in self._parts:
+            B, K = len(moments.batch.h), len(moments.tests)
+            of = multipliers[first : first + B * K * size].reshape(B, K, size) * power
+            first += B * K * size
+            force = np.matmul(moments.tests.T, of / moments.batch.h[:, None, None])
+            force = force.reshape(-1, size)
+            at, slopes = self._points(jets, i), self._slopes(jets, i)
+            curvature = np.zeros((len(at.q), slopes.shape[2], slopes.shape[2]))
+            add_curvature(curvature, self._given.y.curvature(at, force), None)
+            yield i, np.matmul(force[:, None], slopes)[:, 0], curvature
+
+    def _points(self, jets: Sequence[Jet], batch: int) -> Points:
+        q, v, a = jets[batch]
+        return _new_points(q, v, self._ld.point_times[batch], a)
+
+    def _slopes(self, jets: Sequence[Jet], batch: int) -> Array:
+        """dy / d(q, v, a) at the points, (P, size, 3 nv)."""
+        at = self._points(jets, batch)
+        return jet_slopes(self._given.y.slopes(at), None, self._given.y.size, at)

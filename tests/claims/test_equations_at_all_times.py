@@ -1,0 +1,310 @@
+"""Equations at all times: known optima, orders, and motions on lines and planes by Pinocchio alone.
+
+With q_2 = sin q_1 a two-link arm has one coordinate. Its optimum is that of a sum of squares of
+torques over polynomials q_1(t), with torques by Pinocchio's RNEA. It is also that of the equations
+of velocities and of accelerations that follow from this one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+import pytest
+from scipy.optimize import least_squares
+
+import hovi
+
+Array = npt.NDArray[np.float64]
+ENDS = -0.4, 1.3
+DURATION = 1.2
+LEVELS: dict[int, Callable[..., Any]] = {
+    0: lambda q: q[1] - ca.sin(q[0]),
+    1: lambda q, v: v[1] - ca.cos(q[0]) * v[0],
+    2: lambda q, v, a: a[1] - ca.cos(q[0]) * a[0] + ca.sin(q[0]) * v[0] ** 2,
+}
+
+
+@cache
+def reduced_optimum() -> float:
+    """The least 1/2 integral |tau|^2 with q_2 = sin q_1, by 14 modes of q_1 and 60 Gauss points."""
+    model = hovi.load_robot(hovi.example("two_link.urdf")).model
+    data, modes = model.createData(), 14
+    x, w = np.polynomial.legendre.leggauss(60)
+    s, w = (x + 1) / 2, w / 2 * DURATION
+    bump = np.polynomial.Polynomial([0, 0, 1, -2, 1])  # s^2 (1 - s)^2
+    legendre = np.polynomial.Legendre
+    curves = [
+        legendre.basis(j, [0, 1]).convert(kind=np.polynomial.Polynomial) for j in range(modes)
+    ]
+    curves = [bump * curve for curve in curves]
+    rise = np.polynomial.Polynomial([0, 0, 3, -2])
+    jets = np.array([[c.deriv(d)(s) / DURATION**d for c in curves] for d in range(3)])
+    first = np.array([rise.deriv(d)(s) / DURATION**d for d in range(3)]) * (ENDS[1] - ENDS[0])
+    first[0] += ENDS[0]
+
+    def torques(c: Array) -> Array:
+        q, v, a = first + np.einsum("djp,j->dp", jets, c)
+        jet = (
+            np.stack([q, np.sin(q)], axis=1),
+            np.stack([v, np.cos(q) * v], axis=1),
+            np.stack([a, np.cos(q) * a - np.sin(q) * v**2], axis=1),
+        )
+        tau = np.array([pin.rnea(model, data, *at) for at in zip(*jet, strict=True)])
+        return np.asarray((np.sqrt(w)[:, None] * tau).ravel())
+
+    found = least_squares(torques, np.zeros(modes), xtol=1e-14, ftol=1e-14, gtol=1e-14)
+    return float(found.cost)
+
+
+def on_curve(level: int, **options: Any) -> hovi.Solution:
+    """The motion from one end to the other, with q_2 = sin q_1 or a derivative of that."""
+    robot = hovi.load_robot(hovi.example("two_link.urdf"))
+    scene = hovi.Scene(robot, [hovi.effects.Gravity()])
+    given = hovi.Condition(LEVELS[level], hovi.Equal(), name="curve", tolerance=options.pop("room"))
+    start, goal = ([angle, np.sin(angle)] for angle in ENDS)
+    asked: dict[str, Any] = {"limits": "none", "self_collision": False} | options
+    return hovi.plan(scene, start, goal, DURATION, conditions=[given], **asked)
+
+
+@pytest.mark.parametrize("level", LEVELS)
+def test_the_optimum_is_that_of_the_arm_with_one_coordinate(level: int) -> None:
+    found = on_curve(level, tolerance=1e-8, room=1e-6)
+    assert found.success, found.message
+    assert found.n_neg == 0
+    assert found.cost == pytest.approx(reduced_optimum(), rel=2e-8)
+    q = found.trajectory.sample(np.linspace(0.0, DURATION, 5001)).q
+    assert np.abs(q[:, 1] - np.sin(q[:, 0])).max() < 1e-6
+
+
+@pytest.mark.parametrize(("level", "r"), [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2)])
+def test_orders_are_those_of_the_scheme_at_nodes_and_r_plus_4_minus_l_between(
+    level: int, r: int
+) -> None:
+    errors, missed = [], []
+    for N in (16, 32, 64) if r == 0 else (8, 16, 32) if r == 1 else (4, 8, 16):
+        found = on_curve(level, scheme=f"galerkin-{r}", intervals=N, room=1.0)
+        errors.append(abs(found.cost - reduced_optimum()))
+        at = found.trajectory.sample(np.linspace(0.0, DURATION, 4001))
+        y = LEVELS[level](*(x.T for x in (at.q, at.v)[: level + 1]))
+        missed.append(float(np.abs(np.asarray(ca.DM(y))).max()))
+    cost, between = (np.diff(np.log(x)) / -np.log(2.0) for x in (errors, missed))
+    assert cost[-1] > 2 * (r + 2) - 0.4, (cost, errors)
+    assert between[-1] > r + 4 - level - 0.4, (between, missed)
+
+
+def test_a_grid_that_does_not_hold_it_between_the_nodes_is_said() -> None:
+    found = on_curve(0, scheme="galerkin-1", intervals=6, room=1e-6)
+    assert found.status is hovi.Status.UNRESOLVED
+    assert "condition 'curve' is violated: it is missed by " in found.message
+    assert found.violation in found.message
+    assert on_curve(0, scheme="galerkin-1", intervals=6, room=1e-3).success
+
+
+# Lines and planes of a tool, by Pinocchio alone
+
+ARMS = {
+    "ur5": ("tool0", [0.0, -1.2, 1.5, -0.3, 0.5, 0.0]),
+    "xarm7": ("link7", [0.1, -0.3, 0.2, 0.9, 0.1, 1.1, 0.0]),
+    "z1": ("link06", [0.1, 1.2, -1.0, -0.2, 0.1, 0.0]),
+}
+AXES = "x", "y", "z"
+
+
+def tool_at(robot: hovi.Robot, frame: str, q: Array) -> Array:
+    return np.asarray(robot.frame_pose(frame, q)[:3, 3])
+
+
+def reached(robot: hovi.Robot, frame: str, q: Array, target: Array) -> Array:
+    """The configuration near q in which the origin of a frame is at a point."""
+    model, data = robot.model, robot.model.createData()
+    number = model.getFrameId(frame, pin.FrameType.BODY)
+    for _ in range(200):
+        error = target - tool_at(robot, frame, q)
+        J = pin.computeFrameJacobian(model, data, q, number, pin.LOCAL_WORLD_ALIGNED)[:3]
+        q = q + 0.5 * J.T @ np.linalg.solve(J @ J.T + 1e-9 * np.eye(3), error)
+    assert np.abs(target - tool_at(robot, frame, q)).max() < 1e-9
+    return q
+
+
+def kept(frame: str, axes: str, point: Array) -> list[hovi.Condition]:
+    """Coordinates of a frame that stay those of a point."""
+    return [
+        hovi.Condition(
+            f'position["{frame}", "{axis}"]', hovi.Equal(point[AXES.index(axis)]), name=axis
+        )
+        for axis in axes
+    ]
+
+
+@pytest.mark.parametrize("axes", ["x", "xz"])
+@pytest.mark.parametrize("limits", ["none", "urdf"])
+@pytest.mark.parametrize("arm", ARMS)
+def test_a_tool_stays_on_its_plane_or_line(arm: str, limits: str, axes: str) -> None:
+    robot, (frame, home) = hovi.load_robot(arm), ARMS[arm]
+    q0 = np.append(home, np.zeros(robot.nv - len(home)))
+    point = tool_at(robot, frame, q0)
+    q1 = reached(robot, frame, q0, np.add(point, [0.0, 0.2, 0.0]))
+    scene = hovi.Scene(robot, [hovi.effects.Gravity()])
+    asked: dict[str, Any] = {"limits": limits, "self_collision": False}
+    found = hovi.plan(scene, q0, q1, 1.5, conditions=kept(frame, axes, point), **asked)
+    assert found.success, found.message
+    assert found.violation == ""
+    at = found.trajectory.sample(np.linspace(0.0, 1.5, 20001))
+    places = np.array([tool_at(robot, frame, q) for q in at.q[::10]])
+    for axis in axes:
+        assert np.abs(places - point)[:, AXES.index(axis)].max() < 1.1e-6
+    if limits == "urdf":
+        assert np.all(np.abs(at.v) < robot.velocity_limit * (1 + 1e-5))
+        assert np.all((at.q > robot.lower - 1e-5) & (at.q < robot.upper + 1e-5))
+    without = hovi.plan(scene, q0, q1, 1.5, **asked)
+    assert not without.success or found.cost > without.cost * (1 - 1e-3)
+
+
+def test_a_replanned_motion_and_what_is_left_of_one_keep_it() -> None:
+    robot, (frame, home) = hovi.load_robot("ur5"), ARMS["ur5"]
+    q0 = np.array(home)
+    point = tool_at(robot, frame, q0)
+    q1, q2 = (reached(robot, frame, q0, np.add(point, [0.0, y, 0.0])) for y in (0.2, 0.21))
+    scene = hovi.Scene(robot, [hovi.effects.Gravity()])
+    first = hovi.plan(scene, q0, q1, 1.5, conditions=kept(frame, "xz", point))
+    for found in (first.replan(goal=hovi.State(q2)), first.advance(0.4), first.advance("0.7 s")):
+        assert found.success, found.message
+        assert found.nit < first.nit
+        assert found.violation == ""
+        q = found.trajectory.sample(np.linspace(0.0, found.trajectory.duration, 2001)).q
+        places = np.array([tool_at(robot, frame, x) for x in q])
+        assert np.abs(places - point)[:, [0, 2]].max() < 1.1e-6
+    away = first.replan(start=hovi.State(q0 + 1e-2))
+    assert away.status is hovi.Status.INFEASIBLE
+    assert "at the start, where a motion cannot change that" in away.message
+
+
+def test_a_plane_may_move() -> None:
+    robot, (frame, home) = hovi.load_robot("ur5"), ARMS["ur5"]
+    q0 = np.array(home)
+    point = tool_at(robot, frame, q0)
+    q1 = reached(robot, frame, q0, np.add(point, [0.1, 0.2, 0.0]))
+    wave = f'position["{frame}", "x"] - 0.1 * sin(3.141592653589793 * t / 3)^2'
+    moving = hovi.Condition(wave.replace("^", "**"), hovi.Equal(point[0]), name="plane")
+    scene = hovi.Scene(robot, [hovi.effects.Gravity()])
+    found = hovi.plan(scene, q0, q1, 1.5, limits="none", conditions=[moving])
+    assert found.success, found.message
+    t = np.linspace(0.0, 1.5, 2001)
+    x = np.array([tool_at(robot, frame, q)[0] for q in found.trajectory.sample(t).q])
+    assert np.abs(x - point[0] - 0.1 * np.sin(np.pi * t / 3) ** 2).max() < 1.1e-6
+
+
+def test_the_best_duration_on_a_line_is_stationary() -> None:
+    robot, (frame, home) = hovi.load_robot("ur5"), ARMS["ur5"]
+    q0 = np.array(home)
+    point = tool_at(robot, frame, q0)
+    q1 = reached(robot, frame, q0, np.add(point, [0.0, 0.2, 0.0]))
+    scene, line = hovi.Scene(robot, [hovi.effects.Gravity()]), kept(frame, "xz", point)
+    asked: dict[str, Any] = {"limits": "none", "conditions": line, "tolerance": 1e-6}
+    best = hovi.plan(scene, q0, q1, (0.2, 2.5), time_weight=500.0, **asked)
+    assert best.success, best.message
+    T = best.trajectory.duration
+    assert 0.22 < T < 2.4
+    for factor in (0.97, 1.03):
+        other = hovi.plan(scene, q0, q1, factor * T, guess=best.trajectory, **asked)
+        assert other.success, other.message
+        assert other.cost + 500.0 * factor * T > best.cost
+
+
+# What is implied, and what cannot be
+
+
+@pytest.fixture(scope="module")
+def line() -> dict[str, Any]:
+    """A UR5 at rest, a point 0.2 m on a line of its tool, and the line."""
+    robot, (frame, home) = hovi.load_robot("ur5"), ARMS["ur5"]
+    q0 = np.array(home)
+    point = tool_at(robot, frame, q0)
+    goal = np.add(point, [0.0, 0.2, 0.0])
+    known = {"robot": robot, "q0": q0, "q1": reached(robot, frame, q0, goal), "point": point}
+    scene = hovi.Scene(robot, [hovi.effects.Gravity()])
+    return known | {"scene": scene, "goal": goal, "line": kept(frame, "xz", point)}
+
+
+def test_a_frame_that_ends_on_its_line_is_reached(line: dict[str, Any]) -> None:
+    goal = hovi.FrameGoal("tool0", position=line["goal"])
+    found = hovi.plan(line["scene"], line["q0"], goal, 1.5, conditions=line["line"])
+    assert found.success, found.message
+    assert (
+        np.abs(tool_at(line["robot"], "tool0", found.trajectory.q[-1]) - line["goal"]).max() < 2e-6
+    )
+
+
+def test_the_same_condition_twice_changes_nothing(line: dict[str, Any]) -> None:
+    again = [
+        *line["line"],
+        *(hovi.Condition(x.function, x.on, name=f"{x.name} again") for x in line["line"]),
+    ]
+    asked: dict[str, Any] = {"limits": "none", "self_collision": False}
+    ends = line["scene"], line["q0"], line["q1"], 1.5
+    once, twice = (hovi.plan(*ends, conditions=x, **asked) for x in (line["line"], again))
+    assert once.success, once.message
+    assert twice.success, twice.message
+    assert twice.cost == pytest.approx(once.cost, rel=1e-3)
+
+
+def off(q: Array) -> Array:
+    return q + np.array([0.0, 0.02, 0.0, 0.0, 0.0, 0.0])
+
+
+CANNOT: dict[str, tuple[Callable[[dict[str, Any]], dict[str, Any]], str]] = {
+    "start": (lambda x: {"start": off(x["q0"])}, "at the start, where a motion cannot change that"),
+    "goal": (lambda x: {"goal": off(x["q1"])}, "at the goal, where a motion cannot change that"),
+    "velocity": (
+        lambda x: {"start": hovi.State(x["q0"], [0.1] * 6)},
+        "per second at the start, where it should stay: change the velocity there",
+    ),
+    "frame": (
+        lambda x: {"goal": hovi.FrameGoal("tool0", position=np.add(x["goal"], [0.05, 0, 0]))},
+        "is missed by 0.05 at the goal, where a motion cannot change that",
+    ),
+}
+
+
+@pytest.mark.parametrize("what", CANNOT)
+@pytest.mark.parametrize("limits", ["none", "urdf"])
+def test_what_cannot_be_is_infeasible_at_once(line: dict[str, Any], what: str, limits: str) -> None:
+    changes, sentence = CANNOT[what]
+    ends = {"start": line["q0"], "goal": line["q1"]} | changes(line)
+    asked: dict[str, Any] = {"limits": limits, "conditions": line["line"]}
+    found = hovi.plan(line["scene"], ends["start"], ends["goal"], 1.5, **asked)
+    assert found.status is hovi.Status.INFEASIBLE
+    assert sentence in found.message
+    assert found.nit == 0
+
+
+def turned(q: ca.SX, v: ca.SX) -> ca.SX:
+    return v[0] - q[1] * v[2]
+
+
+REFUSED: dict[str, tuple[dict[str, Any], str]] = {
+    "smooth": ({"smooth": True}, "which a cost of order 3 does not support"),
+    "free duration": (
+        {
+            "duration": (0.5, 3.0),
+            "conditions": [hovi.Condition(turned, hovi.Equal(), name="turned")],
+        },
+        "is an equation of velocities at all times, which needs a given duration",
+    ),
+}
+
+
+@pytest.mark.parametrize("what", REFUSED)
+def test_what_is_not_supported_is_refused_in_one_sentence(line: dict[str, Any], what: str) -> None:
+    given, sentence = REFUSED[what]
+    asked = {"duration": 1.5, "conditions": line["line"]} | given
+    with pytest.raises(hovi.HoviError) as refused:
+        hovi.plan(line["scene"], line["q0"], line["q1"], **asked)
+    assert sentence in str(refused.value)
+    assert "\n" not in str(refused.value)
