@@ -11,6 +11,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+import casadi
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
@@ -274,6 +275,36 @@ _problem("frame goal panda")(_frame("panda", 1))
 _problem("frame goal links")(_frame("ur5", 4, self_collision=True))
 _problem("frame goal without limits")(_frame("ur5", 4, limits="none", guess_at_goal=True))
 _problem("frame goal smooth")(_frame("ur5", 5, smooth=True, guess_at_goal=True))
+
+
+def _coupled(arm: str, seed: int, limits: Any, rate: bool = False) -> Problem:
+    """The third joint follows the sine of the second; with a rate, the fourth a product of both."""
+
+    def curve(q: Any) -> Any:
+        return q[2] - casadi.sin(q[1])
+
+    def turning(q: Any, v: Any) -> Any:
+        return v[3] - q[0] * v[1]
+
+    def solved(nudge: int) -> hovi.Solution:
+        scene = _given(arm)
+        a, goal = _ends(scene.robot, seed, 0.3)
+        start = nudged(a, scene.robot, nudge)
+        value = start[2] - np.sin(start[1])
+        goal[2] = np.sin(goal[1]) + value
+        asked = [hovi.Condition(curve, hovi.Equal(value), name="curve")]
+        if rate:
+            asked.append(hovi.Condition(turning, hovi.Equal(), name="turning"))
+        return _plan(scene, start, goal, 2.0, limits=limits, conditions=asked, self_collision=False)
+
+    return solved
+
+
+_problem("coupled joints ur5", True)(_coupled("ur5", 1, "urdf"))
+_problem("coupled joints panda")(_coupled("panda", 2, "urdf"))
+_problem("coupled joints z1")(_coupled("z1", 3, "none"))
+_problem("coupled speeds ur5")(_coupled("ur5", 4, "urdf", rate=True))
+_problem("coupled speeds without limits")(_coupled("ur5", 5, "none", rate=True))
 
 
 @_problem("via ur5", True)

@@ -548,7 +548,7 @@ _rule(
 )
 _rule(
     "adopt multipliers of conditions",
-    "Multipliers of conditions at nodes are those of the similar problem.",
+    "Multipliers of conditions are those of the similar problem.",
     "_adopt",
     "along.conditions is not None",
     "False",

@@ -46,7 +46,7 @@ class PointTerms:
     time_gradient: Array | None = None
 
     def plus(self, gradient: Array, curvature: Array) -> PointTerms:
-        """With a gradient and a Hessian in the jet, (P, m) and (P, m, m), m = (k + 1) nv, more."""
+        """These plus a gradient (P, (k+1) nv) and a Hessian (P, (k+1) nv, (k+1) nv) in the jet."""
         if self.leading_weight is not None:
             curvature = curvature.copy()
             m = self.leading_weight.shape[1]

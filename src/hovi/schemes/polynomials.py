@@ -23,6 +23,12 @@ def legendre(x: Array, degree: int) -> Array:
     return P
 
 
+def orthonormal_legendre(s: Array, count: int) -> Array:
+    """The first shifted Legendre polynomials, orthonormal on [0, 1], at s, shape (count, M)."""
+    degrees = np.arange(count)[:, None]
+    return np.asarray(np.sqrt(2 * degrees + 1) * legendre(2 * s - 1, count - 1))
+
+
 def inner_mode_rows(s: Array, inner_modes: int) -> Array:
     """(double integral, integral, value) of b_2, b_3, ... at s, shape (M, 3, r).
 

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from hovi.checks.arguments import check_arguments
 from hovi.schemes.interval_curve import jet_rows, require_positions
-from hovi.schemes.polynomials import interval_rows, legendre
+from hovi.schemes.polynomials import interval_rows, legendre, orthonormal_legendre
 from hovi.system.dataclass import dataclass
 from hovi.system.summary import Summarized, Summary
 
@@ -105,8 +105,7 @@ class Scheme(Summarized):
         count = self.inner_modes + self.derivatives
         if len(self.points) <= count or not np.array_equal(self.table, self.rows(self.points)):
             return None
-        degrees = np.arange(count)[:, None]
-        return np.sqrt(2 * degrees + 1) * legendre(2 * self.points - 1, count - 1)
+        return orthonormal_legendre(self.points, count)
 
     def rows(self, s: Array) -> Array:
         """The interpolant at s in [0, 1]: (q - q0, h v, h^2 a) over (h v0, Z0, Z1, c).

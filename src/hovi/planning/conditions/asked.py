@@ -73,6 +73,7 @@ def asked_at_nodes(given: Conditions, grid: Grid) -> tuple[Equation, ...]:
     """The equations at the nodes of a grid. Raises InputError where the grid has no such node."""
     found = []
     for each in given:
+        nodes = set[int]()
         for time in times_of([each]):
             node = int(np.argmin(np.abs(grid.t - time)))
             nearest = float(grid.t[node])
@@ -82,7 +83,9 @@ def asked_at_nodes(given: Conditions, grid: Grid) -> tuple[Equation, ...]:
                     f"and the nearest is at {nearest:g} s of {grid.duration:g} s: choose a time "
                     "within the motion, or move a node there by `grid.with_nodes`."
                 )
-            found.append(dataclasses.replace(each, where=AtNode(node, nearest)))
+            if node not in nodes:  # times of one node are one
+                nodes.add(node)
+                found.append(dataclasses.replace(each, where=AtNode(node, nearest)))
     return tuple(found)
 
 

@@ -16,9 +16,9 @@ from hovi.checks.shapes import numbers_of
 from hovi.discrete.grid import DiscretePath
 from hovi.errors import InputError
 from hovi.planning.conditions.expression import Expression, FunctionLike, function_of
-from hovi.planning.conditions.function import Function, Rate, linear
+from hovi.planning.conditions.function import Function, linear
 from hovi.planning.conditions.places import Along, AtNode, AtPoints, AtTimes, Where
-from hovi.planning.conditions.sets import Between, Equal, Near, TwoSided
+from hovi.planning.conditions.sets import Between, Equal, TwoSided
 from hovi.robot.space.coordinates import Coordinates
 from hovi.system.dataclass import dataclass
 
@@ -181,18 +181,9 @@ def _along(given: Condition[Equal | Between, Where], y: Function, on: Coordinate
             f"condition {given.name!r} is an equation of orientations at all times, and needs the "
             "derivative of its function in time: give a formula or a function of CasADi symbols."
         )
+    if level == 0:
+        _ = y.rate  # what is pickled has it
     return Along(level)
-
-
-def near(each: EquationAlong) -> Condition[TwoSided, AtPoints]:
-    """What an equation along a motion accepts between the nodes, in units of its tolerance."""
-    room, names = Near(each.on.value, each.tolerance), (each.name, each.unit)
-    return Condition(each.y, room, EVERYWHERE, *names, each.tolerance, of=each.of)
-
-
-def rate_of(function: Function) -> Function:
-    """dy/dt of a function of q and t, as one of q, v and t."""
-    return function.rate if isinstance(function, Expression) else Rate(function)
 
 
 def _require_size(

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.checks.arguments import check_arguments
+from hovi.scene.lagrangian import over_time
 from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
@@ -19,8 +20,8 @@ Curvature = Mapping[tuple[str, str], Array]
 """See `Function.curvature`."""
 ARGUMENTS = "q", "v", "a", "tau", "t"
 """What a function may depend on."""
-DIFFERENCE = 6e-6
-"""Step of central differences, in [rad], [m] and [s]."""
+STEP = 6e-6
+"""Step of central differences along v, in [rad] or [m]."""
 
 
 @check_arguments
@@ -85,6 +86,11 @@ class Function(ABC):
         """
         return {}
 
+    @property
+    def rate(self) -> Function:
+        """dy/dt of y(q, t) on a vector space, a function of q, v and t."""
+        return Rate(self)
+
     def from_time(self, time: float) -> Function:
         """The same by a clock that starts at a time, in [s]."""
         return LaterFunction(self, time) if "t" in self.needs else self
@@ -121,34 +127,37 @@ class Rate(Function):
 
     def values(self, at: Points) -> Array:
         """J v, and the partial derivative in time."""
-        rate = np.matmul(self.of.slopes(at)["q"], at.v[:, :, None])[:, :, 0]
+        rate = np.matmul(self._slopes(at), at.v[:, :, None])[:, :, 0]
         if "t" in self.needs:
-            before, after = (replace(at, t=at.t + step) for step in (-DIFFERENCE, DIFFERENCE))
-            rate += (self.of.values(after) - self.of.values(before)) / (2 * DIFFERENCE)
+            rate += over_time(lambda t: self.of.values(replace(at, t=t)), at.t)
         return np.asarray(rate)
 
     def slopes(self, at: Points) -> Slopes:
-        """d(J v), and in time by differences."""
-        P, n, J = len(at.q), at.v.shape[1], self.of.slopes(at)["q"]
-        bent = np.zeros((P, self.size, n))
+        """d(J v), and the partial derivative of J in time."""
+        J = self._slopes(at)
+        bent = np.zeros_like(J)
         for entry, weights in enumerate(np.eye(self.size)):
-            H = self.of.curvature(at, np.tile(weights, (P, 1))).get(("q", "q"))
-            if H is not None:
-                bent[:, entry] = np.matmul(H, at.v[:, :, None])[:, :, 0]
+            H = self._curvature(at, np.tile(weights, (len(at.q), 1)))
+            bent[:, entry] = np.matmul(H, at.v[:, :, None])[:, :, 0]
         if "t" in self.needs:
-            before, after = (replace(at, t=at.t + step) for step in (-DIFFERENCE, DIFFERENCE))
-            bent += (self.of.slopes(after)["q"] - self.of.slopes(before)["q"]) / (2 * DIFFERENCE)
+            bent += over_time(lambda t: self._slopes(replace(at, t=t)), at.t)
         return {"q": bent, "v": J}
 
     def curvature(self, at: Points, weights: Array) -> Curvature:
-        """Differences of the function's own along v, and itself in q and v."""
-        own = self.of.curvature(at, weights).get(("q", "q"))
-        if own is None:
-            return {}
-        size = DIFFERENCE / np.maximum(np.abs(at.v).max(axis=1, keepdims=True), 1.0)
+        """In (q, q) the rate of the function's curvature, by differences, in (q, v) that itself."""
+        size = STEP / np.maximum(np.abs(at.v).max(axis=1, keepdims=True), 1.0)
         before, after = (replace(at, q=at.q + s * at.v, t=at.t + s[:, 0]) for s in (-size, size))
-        ends = [self.of.curvature(x, weights)[("q", "q")] for x in (before, after)]
-        return {("q", "q"): (ends[1] - ends[0]) / (2 * size[:, :, None]), ("q", "v"): own}
+        change = self._curvature(after, weights) - self._curvature(before, weights)
+        bent = change / (2 * size[:, :, None])
+        return {("q", "q"): bent, ("q", "v"): self._curvature(at, weights)}
+
+    def _slopes(self, at: Points) -> Array:
+        return np.asarray(self.of.slopes(at)["q"])
+
+    def _curvature(self, at: Points, weights: Array) -> Array:
+        """That in (q, q), (P, nv, nv), zero if the function leaves it out."""
+        n = at.v.shape[1]
+        return self.of.curvature(at, weights).get(("q", "q"), np.zeros((len(at.q), n, n)))
 
     def from_time(self, time: float) -> Function:
         """See Function."""

@@ -9,8 +9,9 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.discrete.trajectory import Trajectory
-from hovi.planning.conditions.condition import EquationAlong, near
+from hovi.planning.conditions.condition import EVERYWHERE, Condition, EquationAlong
 from hovi.planning.conditions.excess import in_words, largest_excess
+from hovi.planning.conditions.sets import Near
 
 Array = npt.NDArray[np.float64]
 
@@ -18,8 +19,10 @@ Array = npt.NDArray[np.float64]
 class MissedAlong(NamedTuple):
     """By how much a motion misses an equation.
 
-    by_interval: the largest |y - value| of each interval, relative to the tolerance, shape (N,).
-    entry: of y, with the largest of all. size: |y - value| there. time: when, in [s].
+    given: the equation. by_interval: the largest |y - value| of each interval, relative to the
+        tolerance, shape (N,).
+    entry: of y, the one that is missed most. size: |y - value| there, in the unit of y. time: when,
+        in [s].
     """
 
     given: EquationAlong
@@ -34,12 +37,15 @@ class MissedAlong(NamedTuple):
         return in_words(self.given, self.entry)
 
     @property
-    def clause(self) -> str:
-        """What the motion misses; "" if it is within the tolerance."""
-        if self.by_interval.max() <= 1.0:
-            return ""
+    def missed(self) -> str:
+        """By how much and when it is missed most, a clause."""
         unit = self.given.unit and f" {self.given.unit}"
         return f"it is missed by {self.size:.3g}{unit} at t = {self.time:.4g} s"
+
+    @property
+    def clause(self) -> str:
+        """What is `missed`; "" within the tolerance."""
+        return self.missed if self.by_interval.max() > 1.0 else ""
 
 
 def missed_along(along: Sequence[EquationAlong], motion: Trajectory) -> list[MissedAlong]:
@@ -53,10 +59,10 @@ def worst_along(along: Sequence[EquationAlong], motion: Trajectory) -> MissedAlo
 
 
 def _missed(given: EquationAlong, motion: Trajectory) -> MissedAlong:
-    excess, at = largest_excess(motion, near(given))
-    beyond = excess.max(axis=0) + 1.0  # the excess over what is accepted
-    k, entry = np.unravel_index(int(np.argmax(beyond)), beyond.shape)
-    side = int(np.argmax(excess[:, k, entry]))
+    room, names = Near(given.on.value, given.tolerance), (given.name, given.unit)
+    accepted = Condition(given.y, room, EVERYWHERE, *names, scale=given.tolerance, of=given.of)
+    excess, at = largest_excess(motion, accepted)
+    side, k, entry = np.unravel_index(int(np.argmax(excess)), excess.shape)
     time = float(motion.t[k] + at[side, k, entry] * motion.grid.steps[k])
-    size = given.tolerance * float(beyond[k, entry])
-    return MissedAlong(given, beyond.max(axis=1), int(entry), size, time)
+    beyond = excess.max(axis=(0, 2)) + 1.0  # the excess is that over what is accepted
+    return MissedAlong(given, beyond, int(entry), given.tolerance * float(beyond[k]), time)

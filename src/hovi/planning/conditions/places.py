@@ -50,7 +50,7 @@ class AtTimes:
         times = np.atleast_1d(numbers_of("the times of an AtTimes", self.times))
         if times.ndim > 1 or times.size == 0 or not (np.isfinite(times) & (times > 0)).all():
             raise InputError(f"an AtTimes needs positive times in [s], got {self.times!r}.")
-        object.__setattr__(self, "times", times)
+        object.__setattr__(self, "times", np.unique(times))
 
 
 @dataclass(frozen=True)

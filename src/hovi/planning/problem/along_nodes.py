@@ -2,12 +2,12 @@
 
 What is given at a node, or asked there already, may imply some of these rows. They are left out,
 since multipliers of rows that depend on each other are not unique: those whose gradient in what is
-free there is a combination of the others'. Where all is given, it has to satisfy the equation.
+free there is a combination of the others'. A row that is left out has to hold where the others do.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -15,21 +15,24 @@ import numpy.typing as npt
 
 from hovi.discrete.grid import Grid
 from hovi.planning.conditions.condition import (
+    TOLERANCE,
     Condition,
     Equation,
     EquationAlong,
     linear_at,
-    rate_of,
 )
 from hovi.planning.conditions.excess import in_words
-from hovi.planning.conditions.function import STATE, Curvature, Function, Points, Slopes, at_state
+from hovi.planning.conditions.function import Curvature, Function, Points, Slopes, at_state
 from hovi.planning.conditions.places import AtNode
 from hovi.planning.conditions.sets import Equal
 from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
+Index = npt.NDArray[np.intp]
 Mask = npt.NDArray[np.bool_]
 
+MOST_RATE = 27.0 / 4.0
+"""Rate times step at which a cubic between a node and the next one deviates by 1."""
 INDEPENDENT = 1e-6
 """Least part of a row, relative to the row, that is no combination of others."""
 
@@ -38,7 +41,7 @@ INDEPENDENT = 1e-6
 class NodeState:
     """What is given at a node.
 
-    name: of the node, in messages. q, v: there, (nq,) and (nv,), or a guess of what is free.
+    name: of the node, in messages. q, v: there, (nq,) and (nv,); what is free has some value.
     free: which components of q, in the tangent space, and of v are free, (2, nv).
     """
 
@@ -47,77 +50,46 @@ class NodeState:
     v: Array
     free: Mask
 
-    def at(self, where: AtNode) -> Points:
-        """The state at a node."""
-        return at_state(self.q, self.v, where.time)
-
 
 @dataclass(frozen=True, eq=False)
-class NodeValues(Function):
-    """Some of the values of a function and of its rates, these times a step in [s]."""
+class Rows(Function):
+    """Some rows of a function. factors: by which they are multiplied, (K,). rows: their numbers."""
 
     of: Function
-    rate: Function | None
-    step: float
-    rows: npt.NDArray[np.intp]
-
-    @classmethod
-    def of_equation(cls, each: EquationAlong, grid: Grid) -> NodeValues:
-        """All rows of an equation, with the mean step of a grid."""
-        rate = rate_of(each.y) if each.where.level == 0 else None
-        rows = np.arange(each.y.size * (1 if rate is None else 2))
-        return cls(each.y, rate, grid.duration / grid.intervals, rows)
-
-    def wanted(self, each: EquationAlong) -> Equal:
-        """The values of an equation, and zero for their rates."""
-        every = np.zeros(self.all_rows)
-        every[: self.of.size] = np.asarray(each.on.value)
-        return Equal(every[self.rows])
+    factors: Array
+    rows: Index
 
     @property
     def needs(self) -> frozenset[str]:
         """See Function."""
-        return self.of.needs if self.rate is None else self.of.needs | self.rate.needs
+        return self.of.needs
 
     @property
     def size(self) -> int:
         """Number of rows."""
         return len(self.rows)
 
-    @property
-    def all_rows(self) -> int:
-        """Number of rows that there are."""
-        return self.of.size * (1 if self.rate is None else 2)
-
     def values(self, at: Points) -> Array:
         """See Function."""
-        y = self.of.values(at)
-        if self.rate is not None:
-            y = np.concatenate([y, self.step * self.rate.values(at)], axis=1)
-        return y[:, self.rows]
+        return np.asarray(self.factors * self.of.values(at)[:, self.rows])
 
     def slopes(self, at: Points) -> Slopes:
         """See Function."""
-        own = self.of.slopes(at)
-        rate = {} if self.rate is None else self.rate.slopes(at)
-        found, none = dict[str, Array](), np.zeros((len(at.q), self.of.size, at.v.shape[1]))
-        for name in (x for x in STATE if x in own or x in rate):
-            J = own.get(name, none)
-            if self.rate is not None:
-                J = np.concatenate([J, self.step * rate.get(name, none)], axis=1)
-            found[name] = J[:, self.rows]
-        return found
+        factors = self.factors[:, None]
+        return {x: factors * J[:, self.rows] for x, J in self.of.slopes(at).items()}
 
     def curvature(self, at: Points, weights: Array) -> Curvature:
         """See Function."""
-        every = np.zeros((len(at.q), self.all_rows))
-        every[:, self.rows] = weights
-        found = dict(self.of.curvature(at, every[:, : self.of.size]))
-        if self.rate is not None:
-            more = self.rate.curvature(at, self.step * every[:, self.of.size :])
-            for pair, block in more.items():
-                found[pair] = found[pair] + block if pair in found else block
-        return found
+        every = np.zeros((len(at.q), self.of.size))
+        every[:, self.rows] = self.factors * weights
+        return self.of.curvature(at, every)
+
+    def describe(self, at: Points, missed: Array) -> str:
+        """See Function."""
+        sizes = np.abs(missed) / self.factors
+        entry = int(np.argmax(np.abs(missed)))
+        which = f"its entry {self.rows[entry]}" if self.of.size > 1 else "it"
+        return f"{which} misses it by {sizes[entry]:.3g}"
 
 
 def equations_at_nodes(
@@ -125,82 +97,117 @@ def equations_at_nodes(
     grid: Grid,
     given: Mapping[int, NodeState],
     others: Sequence[Equation],
-) -> Iterator[Equation]:
+    sizes: Sequence[Array],
+) -> tuple[list[Equation], str]:
     """The equations along a motion at the nodes of its grid, without what is implied there.
 
+    Also which of them is violated, whatever the motion, a sentence without its end; "" if none is.
+
     given: what is, by the number of the node; nodes at which others ask for something are among
-    them. others: equations that are asked at nodes already.
+    them. others: equations that are asked at nodes already. sizes: see `sizes_of`.
     """
-    for each in along:
-        if each.where.level > 1:
-            continue
-        values = NodeValues.of_equation(each, grid)
-        on = values.wanted(each)
+    found, reason, step = list[Equation](), "", grid.duration / grid.intervals
+    known = zip(along, sizes, strict=True)
+    for part in (part for each, size in known for part in _parts(each, size, step)):
         for node, time in enumerate(grid.t.tolist()):
-            where, own, wanted, state = AtNode(node, time), values, on, given.get(node)
-            if state is not None:
-                asked = [x for x in others if x.where.node == node]
-                own = replace(values, rows=_independent(values, where, state, asked))
-                wanted = own.wanted(each)
-            if own.size > 0:
-                equation = Condition(own, wanted, where, each.name)
-                others = others if state is None else [*others, equation]
-                yield equation
-
-
-def missed_where_given(
-    along: Sequence[EquationAlong],
-    grid: Grid,
-    given: Mapping[int, NodeState],
-    others: Sequence[Equation],
-) -> str:
-    """Which equation is violated where all is given, a sentence without its end; "" if none is.
-
-    Also what is implied by others that are asked at a node, and violated where these hold.
-    Arguments as of `equations_at_nodes`.
-    """
-    for each in along:
-        if each.where.level > 1:
-            continue
-        values = NodeValues.of_equation(each, grid)
-        for node, state in given.items():
-            where = AtNode(node, float(grid.t[node]))
-            asked = [x for x in others if x.where.node == node]
-            missed = [x.on.missed(x.y.values(state.at(where))[0]) for x in asked]
-            if any(np.abs(x).max(initial=0.0) > each.tolerance for x in missed):
-                continue  # a guess that does not satisfy them
-            kept = _independent(values, where, state, asked)
-            over = np.abs(values.wanted(each).missed(values.values(state.at(where))[0]))
-            over[kept] = 0.0
-            entry = int(np.argmax(over))
-            if over[entry] <= each.tolerance:
+            where, state = AtNode(node, time), given.get(node)
+            if state is None:
+                found.append(part.at(where))
                 continue
-            name, size = in_words(each, entry % each.y.size), over[entry]
-            if entry < each.y.size:
-                return (
-                    f"{name} is missed by {size:.3g} at {state.name}, where a motion cannot change "
-                    f"that: change {state.name}"
-                )
+            asked = [x for x in others if x.where.node == node]
+            before = [*asked, *(x for x in found if x.where.node == node)]
+            kept = _independent(part.at(where), before, state, step)
+            if len(kept) > 0:
+                found.append(part.some(kept).at(where))
+            if all(np.abs(_missed(x, state)).max() <= TOLERANCE for x in asked):
+                left = np.setdiff1d(part.rows.rows, kept)
+                reason = reason or part.some(left).violated(where, state)
+    return found, reason
+
+
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """The values of an equation at nodes, or its rates. step: of the grid, in [s]."""
+
+    given: EquationAlong
+    rows: Rows
+    wanted: Equal
+    rate: bool
+    step: float
+
+    def at(self, where: AtNode) -> Equation:
+        """The equation at a node."""
+        return Condition(self.rows, self.wanted, where, self.given.name)
+
+    def some(self, chosen: Index) -> _Part:
+        """Some of its rows."""
+        rows = replace(self.rows, rows=chosen, factors=self.rows.factors[chosen])
+        return replace(self, rows=rows, wanted=Equal(np.asarray(self.wanted.value)[chosen]))
+
+    def violated(self, where: AtNode, state: NodeState) -> str:
+        """What of it is violated at a state, whatever is free there; "" if nothing is."""
+        if self.rows.size == 0:
+            return ""
+        missed = np.abs(_missed(self.at(where), state)) / self.rows.factors
+        worst = int(np.argmax(missed))  # what is no number comes first
+        name, size = in_words(self.given, int(self.rows.rows[worst])), missed[worst]
+        if size * (self.step / MOST_RATE if self.rate else 1.0) <= self.given.tolerance:
+            return ""
+        if np.isnan(size):
+            return f"{name} has no value at {state.name}: change {state.name}"
+        if self.rate:
             return (
-                f"{name} changes by {size / values.step:.3g} per second at {state.name}, where it "
-                "should stay: change the velocity there"
+                f"{name} changes by {size:.3g} per second at {state.name}, where it should stay: "
+                "change the velocity there"
             )
-    return ""
+        return (
+            f"{name} is missed by {size:.3g} at {state.name}, where a motion cannot change that: "
+            f"change {state.name}"
+        )
+
+
+def _parts(each: EquationAlong, size: Array, step: float) -> list[_Part]:
+    """What is asked at nodes: values below level 2, rates of level 0."""
+    y, level, every = each.y, each.where.level, np.arange(each.y.size)
+    value = size * np.asarray(each.on.value, dtype=float)
+    parts = list[_Part]()
+    if level < 2:
+        values = Rows(y, step**level * size, every)
+        parts.append(_Part(each, values, Equal(step**level * value), False, step))
+    if level == 0:
+        rates = Rows(y.rate, step * size, every)
+        parts.append(_Part(each, rates, Equal(np.zeros(y.size)), True, step))
+    return parts
+
+
+def sizes_of(each: EquationAlong, jets: Sequence[Array], times: Array) -> Array:
+    """Factors of an equation by which its rows are of one size, whatever the unit of y, (size,).
+
+    They are 1 over its largest derivative in q^(l) at some instants. jets: q, v and a there.
+    """
+    q, v, a = jets
+    level = "q", "v", "a"
+    J = np.abs(each.y.slopes(Points(q, v, times, a))[level[each.where.level]])
+    largest = np.nan_to_num(J.max(axis=(0, 2)), posinf=0.0)
+    return np.where(largest > 0.0, 1.0 / np.where(largest > 0.0, largest, 1.0), 1.0)
+
+
+def _missed(each: Equation, state: NodeState) -> Array:
+    """By how much a state misses an equation, shape (size,)."""
+    return each.on.missed(each.y.values(at_state(state.q, state.v, each.where.time))[0])
 
 
 def _independent(
-    values: NodeValues, where: AtNode, state: NodeState, asked: Sequence[Equation]
-) -> npt.NDArray[np.intp]:
-    """The rows whose gradients in what is free are no combinations of others'."""
-    every = Condition(values, Equal(), where)
-    rows = np.concatenate([linear_at(each, state.q, state.v)[1] for each in (*asked, every)])
-    columns = rows * [[1.0], [1.0 / values.step]]
-    chosen = independent_rows(columns.reshape(len(rows), -1), state.free.ravel())
-    first = len(rows) - values.size
+    every: Equation, before: Sequence[Equation], state: NodeState, step: float
+) -> Index:
+    """The rows whose gradients in what is free are no combinations of those before."""
+    rows = np.concatenate([linear_at(each, state.q, state.v)[1] for each in (*before, every)])
+    columns = (rows / np.array([[1.0], [step]])).reshape(len(rows), -1)
+    chosen, first = independent_rows(columns, state.free.ravel()), len(rows) - every.y.size
     return chosen[chosen >= first] - first
 
 
-def independent_rows(rows: Array, free: Mask) -> npt.NDArray[np.intp]:
+def independent_rows(rows: Array, free: Mask) -> Index:
     """The rows of a matrix (E, m) that are no combinations of those before, in free columns."""
     basis, found = np.zeros((0, rows.shape[1])), []
     for number, row in enumerate(rows):

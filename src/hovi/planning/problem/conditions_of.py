@@ -38,7 +38,7 @@ def between_ends(problem: TrajectoryProblem) -> Iterator[Condition[Any, Any]]:
     """What is asked of a motion that has its ends.
 
     What is given at seams; no torque at passive joints; equations at nodes; limits; bounds of
-    functions; distances. Equations at all times come after those at nodes, which have their own.
+    functions; distances. Those at all times follow equations at nodes, among which are theirs.
     """
     for hold in problem.holds:
         verb = f"passes t = {hold.time:.4g} s"

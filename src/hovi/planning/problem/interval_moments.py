@@ -11,7 +11,7 @@ import numpy.typing as npt
 from hovi.discrete.contraction import AnyCharts
 from hovi.discrete.interval_batch import IntervalBatch
 from hovi.discrete.interval_charts import IntervalCharts
-from hovi.schemes.polynomials import legendre
+from hovi.schemes.polynomials import orthonormal_legendre
 from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
@@ -19,7 +19,9 @@ Array = npt.NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class IntervalMoments:
-    """m_j of B intervals of one scheme with Q points, against K test functions P_j.
+    """m_j = integral of P_j(s) y(s) ds over [0, 1], by the quadrature of a scheme with Q points.
+
+    Of B intervals, against K test functions P_j.
 
     tests: P_j at the points, (K, Q).
     """
@@ -28,10 +30,9 @@ class IntervalMoments:
     tests: Array
 
     @classmethod
-    def of_degree(cls, batch: IntervalBatch, below: int) -> Self:
-        """Against the orthonormal shifted Legendre polynomials of degrees below a number."""
-        degrees, s = np.arange(below)[:, None], batch.scheme.points
-        return cls(batch, np.sqrt(2 * degrees + 1) * legendre(2 * s - 1, max(below - 1, 0))[:below])
+    def legendre(cls, batch: IntervalBatch, count: int) -> Self:
+        """Against the first orthonormal shifted Legendre polynomials; count: at least 1."""
+        return cls(batch, orthonormal_legendre(batch.scheme.points, count))
 
     @cached_property
     def root_steps(self) -> Array:

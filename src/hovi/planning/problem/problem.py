@@ -38,7 +38,8 @@ from hovi.planning.conditions.condition import (
     Inequality,
     equation,
 )
-from hovi.planning.problem.along_nodes import NodeState, equations_at_nodes, missed_where_given
+from hovi.planning.conditions.state_difference import StateDifference
+from hovi.planning.problem.along_nodes import NodeState, equations_at_nodes, sizes_of
 from hovi.planning.problem.clock import Clock, Lengths
 from hovi.planning.problem.conserved_momentum import Stop, kept_in_free_fall
 from hovi.planning.problem.frame_goal import FrameGoal
@@ -161,30 +162,30 @@ class TrajectoryProblem(ProblemSummary):
             if excused != limits.excused:
                 object.__setattr__(self, "limits", dataclasses.replace(limits, excused=excused))
         if self.along:
-            unreachable = unreachable or self._set_equations_along()
+            known = self.grid, self._given_at_nodes(), self.equations
+            more, reason = equations_at_nodes(self.along, *known, self.along_sizes)
+            object.__setattr__(self, "equations", (*self.equations, *more))
+            unreachable = unreachable or reason
         object.__setattr__(self, "unreachable", unreachable)
         if self.clearance is not None:  # raises for missing collision shapes
             ends = self.ends[0], self.free_ends, self.grid.duration
             object.__setattr__(self, "clearance", with_gaps(self.robot, self.clearance, *ends))
 
-    def _set_equations_along(self) -> str:
-        """Add equations along the motion at the nodes; what they miss where all is given, or ""."""
+    def _given_at_nodes(self) -> dict[int, NodeState]:
+        """What is given at the nodes at both ends, at seams, and where equations are asked."""
         (q0, q1), (v0, v1), N = self.ends[0], self.ends[1], self.grid.intervals
-        given = {
-            each.where.node: NodeState(
-                f"t = {each.where.time:.4g} s", q0, v0, np.ones_like(self.free_ends[0, :2])
-            )
-            for each in self.equations
-        }
-        given |= {
-            hold.node: NodeState(f"t = {hold.time:.4g} s", hold.q, hold.v, ~hold.fixed)
-            for hold in self.holds
-        }
+        free, given = np.ones_like(self.free_ends[0, :2]), dict[int, NodeState]()
+        for each in self.equations:
+            jet = each.y.jet if isinstance(each.y, StateDifference) else (q0, v0)
+            v = jet[1] if len(jet) > 1 else v0
+            name = f"the motion at t = {each.where.time:.4g} s"
+            given[each.where.node] = NodeState(name, jet[0], v, free)
+        for hold in self.holds:
+            name = f"the goal at t = {hold.time:.4g} s"
+            given[hold.node] = NodeState(name, hold.q, hold.v, ~hold.fixed)
         given[0] = NodeState("the start", q0, v0, self.free_ends[0, :2])
         given[N] = NodeState("the goal", q1, v1, self.free_ends[1, :2])
-        known = self.along, self.grid, given, self.equations
-        object.__setattr__(self, "equations", (*self.equations, *equations_at_nodes(*known)))
-        return missed_where_given(*known)
+        return given
 
     def _leave_out_what_is_conserved(self) -> str:
         """Free what conserved momenta imply at seams and the goal; why they forbid these, or ""."""
@@ -428,6 +429,17 @@ class TrajectoryProblem(ProblemSummary):
         return self.scene.passive_coordinates if self.about_robot else np.zeros(0, np.intp)
 
     @cached_property
+    def along_sizes(self) -> list[Array]:
+        """The factors of the equations along the motion: see `sizes_of`."""
+        (q0, q1), on, T = self.ends[0], self.coordinates, self.grid.duration
+        q = np.stack([q0, on.integrate(q0, 0.5 * on.difference(q0, q1)), q1])
+        v, t = (
+            np.stack([self.ends[1][0], on.difference(q0, q1) / T, self.ends[1][1]]),
+            T * np.arange(3) / 2,
+        )
+        return [sizes_of(each, (q, v, np.zeros_like(v)), t) for each in self.along]
+
+    @cached_property
     def torque_moments(self) -> TorqueMoments | None:
         """How passive torques vanish in an interval: as moments; None if at all points."""
         return TorqueMoments.of(self.ld, self.passive)
@@ -435,7 +447,9 @@ class TrajectoryProblem(ProblemSummary):
     @property
     def constrained(self) -> bool:
         """Whether there are equality constraints: at nodes, at all times, or passive joints."""
-        return bool(self.equations or self.along) or len(self.passive) > 0
+        modes = [scheme.inner_modes for scheme, _ in self.grid.groups]
+        moments = any(r + each.where.level > 0 for r in modes for each in self.along)
+        return bool(self.equations) or moments or len(self.passive) > 0
 
     @property
     def plain(self) -> bool:

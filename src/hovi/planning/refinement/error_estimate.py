@@ -233,7 +233,7 @@ def finer_solution(
     if not solution.success:
         return None
     path, cost = solution.trajectory.path, solution.cost
-    return FinerSolution(fine, path, cost, known + price, gains, lambda: solution)
+    return FinerSolution(fine, path, cost, known + price, gains, partial(_itself, solution))
 
 
 def _solved(
@@ -255,8 +255,19 @@ def _solved(
     known, cost = cost_of(problem, path), solution.cost
     gains = _cost_of_difference(problem, path, finer, abs(known - cost))
     return FinerSolution(
-        solution.problem, finer.path, cost, known, gains, lambda: solution, solution.central
+        solution.problem,
+        finer.path,
+        cost,
+        known,
+        gains,
+        partial(_itself, solution),
+        solution.central,
     )
+
+
+def _itself(solution: Solution) -> Solution:
+    """A solution that is known; with it as an argument, a function that can be pickled."""
+    return solution
 
 
 def _cost_of_difference(

@@ -34,7 +34,7 @@ def next_grid(candidate: Candidate) -> Grid:
     rho = _decay(candidate, finer)
     error = np.inf if candidate.error_of_cost is None else candidate.error_of_cost
     decay_known = error <= MAX_ERROR_OF_DECAY
-    # with larger errors torques could hide between them; equations leave wrists free to spin there
+    # with larger errors torques could hide between them, and joints that equations leave free spin
     few_points = error <= CURVE_TOLERANCE and not problem.along
     same_steps = np.array_equal(problem.grid.steps, finer.problem.grid.steps)
     # with all intervals halved, as under limits, its own estimate would need twice as many again

@@ -230,11 +230,11 @@ class ActionObjective(Objective[DiscretePath]):
         add: adds further terms to the expansion.
         """
         multipliers = self.multipliers
-        jets = self.jets(x)
+        jets, forces = self.jets(x), list[Array]()
         if multipliers is not None:
             terms = self._with_moments(x, multipliers).added_to(terms)
-            forces = multipliers.forced(self.equations.conditions(x, jets))
-            self.equations.add_to(terms, forces, jets)
+            forces = multipliers.forces_of_conditions(self.equations.conditions(x, jets))
+            self.equations.add_forces(terms, forces, jets)
         self._expansion = _expand(
             self.ld, x, self.coordinates, curvatures, terms, jets, self.keep_points
         )

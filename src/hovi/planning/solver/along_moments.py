@@ -31,19 +31,16 @@ _new_points = without_checks(Points)  # called at each step
 
 
 class AlongMoments:
-    """The moments of one equation on the grid of a problem."""
+    """The moments of one equation on the grid of a problem, times its factors `size`."""
 
-    def __init__(self, problem: TrajectoryProblem, given: EquationAlong) -> None:
-        self._given, self._ld = given, problem.ld
-        level = given.where.level
-        degrees = (
-            (i, batch, batch.modes + level) for i, batch in enumerate(problem.ld.interval_batches)
-        )
-        self._parts = [
-            (i, IntervalMoments.of_degree(batch, below), batch.h[:, None, None] ** level)
-            for i, batch, below in degrees
-            if below > 0  # else the conditions at the nodes are all
-        ]
+    def __init__(self, problem: TrajectoryProblem, given: EquationAlong, size: Array) -> None:
+        self._given, self._ld, self._size = given, problem.ld, size
+        self._parts = list[tuple[int, IntervalMoments, Array]]()
+        for i, batch in enumerate(problem.ld.interval_batches):
+            count, level = batch.modes + given.where.level, given.where.level
+            if count > 0:  # else the conditions at the nodes are all
+                moments = IntervalMoments.legendre(batch, count)
+                self._parts.append((i, moments, batch.h[:, None, None] ** level))
 
     @property
     def size(self) -> int:
@@ -55,7 +52,7 @@ class AlongMoments:
         """m_j, flat. jets: (q, v, a) at the quadrature points, per batch."""
         found = np.zeros(0)
         for i, moments, power in self._parts:
-            missed = self._given.on.missed(self._given.y.values(self._points(jets, i)))
+            missed = self._size * self._given.on.missed(self._given.y.values(self._points(jets, i)))
             found = np.append(found, power * moments.of(missed))
         return found
 
@@ -63,7 +60,8 @@ class AlongMoments:
         """Their derivatives in nodal columns, per batch. expansion: at the same path."""
         found = []
         for i, moments, power in self._parts:
-            slopes = moments.slopes(self._slopes(jets, i), expansion.charts_of(i))
+            own = self._size[:, None] * self._slopes(jets, i)
+            slopes = moments.slopes(own, expansion.charts_of(i))
             h = moments.batch.h[:, None, None]
             found.append(ConstraintRows(moments.batch.index, slopes * (power / h)[..., None]))
         return found
@@ -71,15 +69,15 @@ class AlongMoments:
     def terms(self, jets: Sequence[Jet], multipliers: Array) -> Iterator[tuple[int, Array, Array]]:
         """A batch, and gradient (P, 3 nv) and curvature (P, 3 nv, 3 nv) in (q, v, a) at its points.
 
-        Those of a Lagrangian whose action is sum of multipliers m_j, with their flat multipliers.
+        The action of these terms is sum_j multipliers_j m_j. multipliers: flat, as `residual`.
         """
         first, size = 0, self._given.y.size
         for i, moments, power in self._parts:
             B, K = len(moments.batch.h), len(moments.tests)
-            of = multipliers[first : first + B * K * size].reshape(B, K, size) * power
+            mu = multipliers[first : first + B * K * size].reshape(B, K, size) * power
             first += B * K * size
-            force = np.matmul(moments.tests.T, of / moments.batch.h[:, None, None])
-            force = force.reshape(-1, size)
+            force = np.matmul(moments.tests.T, mu / moments.batch.h[:, None, None])
+            force = force.reshape(-1, size) * self._size
             at, slopes = self._points(jets, i), self._slopes(jets, i)
             curvature = np.zeros((len(at.q), slopes.shape[2], slopes.shape[2]))
             add_curvature(curvature, self._given.y.curvature(at, force), None)

@@ -38,9 +38,9 @@ MAX_ROUNDS = 60
 TORQUE_TOLERANCE = 1e-10
 """Largest passive torque at convergence, relative to the largest torque."""
 CONDITION_TOLERANCE = 1e-11
-"""Largest residual of a condition at convergence, in [rad] or [m]."""
+"""Largest residual of a condition at convergence."""
 FEASIBLE_RESIDUAL = 1e-6
-"""Residual above which a problem counts as infeasible: relative for torques, else [rad] or [m]."""
+"""Residual above which a problem counts as infeasible: relative for torques."""
 FIRST_DECREASE = 1e-3
 """Relative decrease at which a first round stops; later rounds stop by their residual."""
 
@@ -104,7 +104,7 @@ def first_multipliers(problem: TrajectoryProblem, path: DiscretePath) -> Multipl
     cost = max(abs(problem.ld.action(path)), 1e-6)
     action = ActionObjective(problem)
     penalties = INITIAL_TORQUE_PENALTY * weight, INITIAL_PENALTY * cost
-    zero = Multipliers.zero(problem, action.equations, *penalties)
+    zero = Multipliers.zero(action.equations, *penalties)
     fraction = action.residuals(path).torque_fraction
     warm = fraction <= WARM_TORQUE_FRACTION
     return zero.with_scaled_penalties(WARM_PENALTY_FACTOR, 1.0) if warm else zero
@@ -144,7 +144,7 @@ def unmet_sentence(problem: TrajectoryProblem, path: DiscretePath, residuals: Re
     """
     if within(residuals, FEASIBLE_RESIDUAL, FEASIBLE_RESIDUAL):
         return spurious_sentence(problem, path)
-    if residuals.torque_fraction > FEASIBLE_RESIDUAL or residuals.condition_error == 0.0:
+    if residuals.torque_fraction > FEASIBLE_RESIDUAL or not (problem.equations or problem.along):
         return (
             f"no motion was found with zero torque at passive joint {passive_joints(problem)}: the "
             f"remaining torque is {residuals.torque_fraction:.3g} of the largest; allow more time "
@@ -162,7 +162,7 @@ def missed_sentence(problem: TrajectoryProblem, path: DiscretePath) -> str:
     residuals = ActionObjective(problem).residuals(path)
     if within(residuals, FEASIBLE_RESIDUAL, FEASIBLE_RESIDUAL):
         return ""
-    if residuals.torque_fraction > FEASIBLE_RESIDUAL or residuals.condition_error == 0.0:
+    if residuals.torque_fraction > FEASIBLE_RESIDUAL or not (problem.equations or problem.along):
         fraction, joint = residuals.torque_fraction, passive_joints(problem)
         return f" So far, the torque at passive joint {joint} is {fraction:.3g} of the largest."
     name, missed = _worst(problem, path)
@@ -176,4 +176,4 @@ def _worst(problem: TrajectoryProblem, path: DiscretePath) -> tuple[str, str]:
         worst = problem.equations[int(np.argmax(sizes))]
         return f"{whose(worst)} at t = {worst.where.time:.4g} s", describe(worst, path)
     along = worst_along(problem.along, problem.trajectory(path))
-    return along.subject, along.clause
+    return along.subject, along.missed

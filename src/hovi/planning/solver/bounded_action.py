@@ -50,8 +50,8 @@ class BoundedAction(BoundedObjective[DiscretePath]):
     more: further outputs.
     rows: control points, bounded instead of values at the points and refined in place; or None.
     tolerances: where steps satisfy equations and their multipliers follow, those of passive
-        torques, relative to the largest torque, and of conditions at nodes, in [rad] or [m]; None
-        where the multipliers stay.
+        torques, relative to the largest torque, and of conditions, in the unit of y; None where the
+        multipliers stay.
     """
 
     tolerances: tuple[float, float] | None = None

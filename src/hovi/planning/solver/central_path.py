@@ -36,7 +36,7 @@ class CentralPath:
     rows: bounded control points; None to build them anew.
     barrier: slacks and multipliers of the solution, at the points and in the rows; None for none.
     near: rows of distances; None to find them anew.
-    conditions: multipliers of the conditions at nodes; None for none.
+    conditions: multipliers of the conditions; None for none.
     """
 
     points: tuple[tuple[float, DiscretePath], ...]

@@ -39,7 +39,7 @@ _expand = without_checks(DiscreteLagrangian.expand)
 class ConstrainedAction(EqualityObjective[DiscretePath]):
     """The discrete action in nodal coordinates, and the equations.
 
-    problem: the trajectory problem. path: a guess, whose action scales the conditions at nodes.
+    problem: the trajectory problem. path: a guess, whose action scales the conditions.
     torque_penalty, penalty: weights of |c|^2 for which torques and conditions count alike.
     """
 
@@ -88,7 +88,7 @@ class ConstrainedAction(EqualityObjective[DiscretePath]):
         expansion = _expand(ld, x, "nodal", slopes, terms, jets)
         rows = self.equations.rows(x, expansion, jets)
         if terms is not None:
-            _take_out(rows[: len(rows) - len(self.equations.at_nodes)], multipliers, expansion)
+            _take_out(self.equations.in_intervals(rows), multipliers, expansion)
         self.equations.add_curvature(x, others, expansion.hessian)
         structure = self.problem.structure
         metric = structure.metric["nodal"]
@@ -107,8 +107,7 @@ class ConstrainedAction(EqualityObjective[DiscretePath]):
     def multipliers(self, y: Array) -> Multipliers:
         """The multipliers of the equations as lambda at points, and those of conditions."""
         torque, others = self.equations.split(y)
-        known = self.problem, self.equations, self.torque_penalty, self.penalty
-        zero = Multipliers.zero(*known)
+        zero = Multipliers.zero(self.equations, self.torque_penalty, self.penalty)
         for force, passive in zip(zero.torque, torque, strict=False):  # none without passive joints
             force[:, self.problem.passive] = passive
         return dataclasses.replace(zero, conditions=others)
@@ -117,7 +116,7 @@ class ConstrainedAction(EqualityObjective[DiscretePath]):
         """The multipliers as terms at the quadrature points of a path."""
         known = self.multipliers(y)
         terms = known.forces
-        self.equations.add_to(terms, known.conditions, self.action.jets(x))
+        self.equations.add_forces(terms, known.conditions, self.action.jets(x))
         return terms
 
     def of_conditions(self, known: Multipliers) -> Array:

@@ -36,7 +36,8 @@ class Equations:
         passive = problem.passive
         self.moments = TorqueMoments.everywhere(problem.ld, passive) if len(passive) > 0 else None
         self.passive_joints = _joints_of(problem) if len(passive) > 0 else passive
-        self.along = [AlongMoments(problem, each) for each in problem.along]
+        parts = zip(problem.along, problem.along_sizes, strict=True)
+        self.along = [AlongMoments(problem, each, size) for each, size in parts]
         self.at_nodes = NodeEquations.of(problem.equations, problem.grid)
         self._known: tuple[KktLayout, Array] | None = None
 
@@ -101,9 +102,12 @@ class Equations:
         ends = first + np.cumsum([0, *self.sizes])
         return torque, [self.scale * y[a:b] for a, b in itertools.pairwise(ends)]
 
-    def add_to(self, terms: list[PointTerms], of: list[Array], jets: Sequence[Jet]) -> None:
-        """Add the forces of conditions along the motion, with their multipliers, in place."""
-        for each, multipliers in zip(self.along, of, strict=False):
+    def add_forces(self, terms: list[PointTerms], mu: list[Array], jets: Sequence[Jet]) -> None:
+        """Add those of conditions along the motion to terms at the points, in place.
+
+        mu: multipliers of `conditions`.
+        """
+        for each, multipliers in zip(self.along, mu, strict=False):  # those at nodes come after
             for i, gradient, curvature in each.terms(jets, multipliers):
                 terms[i] = terms[i].plus(gradient, curvature)
 
@@ -117,25 +121,26 @@ class Equations:
     ) -> None:
         """Add conditions c with the terms mu c + penalty c^2 / 2 to an expansion, in place.
 
-        forces: mu + penalty c. Those of `add_to` are in the expansion already.
+        forces: mu + penalty c. Those of `add_forces` are in the expansion already.
         """
         known = self.condition_rows(x, expansion, jets)
-        for number, (rows, force) in enumerate(zip(known, forces, strict=True)):
-            first = 0
-            for each in rows:
-                B, _, m, n = each.slopes.shape
-                product = np.matmul(each.flat.transpose(0, 2, 1), penalty * each.flat)
-                blocks = product.reshape(B, m, n, m, n).transpose(0, 1, 3, 2, 4)
-                expansion.hessian[each.index, :m, :m] += blocks
-                if number >= len(self.along):
-                    own = each.weighted(force[first : first + each.size])
-                    expansion.gradient[each.index, :m] += own
-                first += each.size
+        for each in itertools.chain(*known):
+            B, _, m, n = each.slopes.shape
+            product = np.matmul(each.flat.transpose(0, 2, 1), penalty * each.flat)
+            blocks = product.reshape(B, m, n, m, n).transpose(0, 1, 3, 2, 4)
+            expansion.hessian[each.index, :m, :m] += blocks
+        at_nodes = known[len(self.along) :], forces[len(self.along) :]
+        for (each,), force in zip(*at_nodes, strict=True):
+            expansion.gradient[each.index, : each.slopes.shape[2]] += each.weighted(force)
         self.add_curvature(x, forces, expansion.hessian)
 
-    def add_curvature(self, x: DiscretePath, of: list[Array], hessian: Array) -> None:
+    def in_intervals(self, rows: list[ConstraintRows]) -> list[ConstraintRows]:
+        """Of `rows`, those whose forces act at the points: all but those at nodes."""
+        return rows[: len(rows) - len(self.at_nodes)]
+
+    def add_curvature(self, x: DiscretePath, mu: list[Array], hessian: Array) -> None:
         """Add the curvature of conditions at nodes to Hessians of the intervals, in place."""
-        for each, multipliers in zip(self.at_nodes, of[len(self.along) :], strict=True):
+        for each, multipliers in zip(self.at_nodes, mu[len(self.along) :], strict=True):
             each.add_curvature(x, multipliers, hessian)
 
 

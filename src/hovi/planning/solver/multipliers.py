@@ -17,7 +17,6 @@ import dataclasses
 import numpy as np
 import numpy.typing as npt
 
-from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.equations import Equations
 from hovi.scene.lagrangian import PointTerms
 from hovi.system.dataclass import dataclass
@@ -46,7 +45,7 @@ class Residuals:
 
     @property
     def condition_error(self) -> float:
-        """The largest component of a condition, in [m] or [rad]."""
+        """The largest component of a condition, in the unit of y, of rates times a step."""
         return max((float(np.max(np.abs(c), initial=0.0)) for c in self.conditions), default=0.0)
 
 
@@ -67,14 +66,9 @@ class Multipliers:
     jet_size: int
 
     @classmethod
-    def zero(
-        cls,
-        problem: TrajectoryProblem,
-        equations: Equations,
-        torque_penalty: float,
-        penalty: float,
-    ) -> Multipliers:
-        """Zero multipliers with given penalties. equations: of the problem."""
+    def zero(cls, equations: Equations, torque_penalty: float, penalty: float) -> Multipliers:
+        """Zero multipliers of a problem's equations, with given penalties."""
+        problem = equations.problem
         lagrangian = problem.ld.lagrangian
         outputs = len(lagrangian.output_weight)
         torque = [np.zeros((len(t), outputs)) for t in problem.ld.point_times]
@@ -87,10 +81,10 @@ class Multipliers:
         torques = zip(self.torque, residuals.torque, strict=True)
         torque = [self.plus_penalty(force, tau, passive) for force, tau in torques]
         return dataclasses.replace(
-            self, torque=torque, conditions=self.forced(residuals.conditions)
+            self, torque=torque, conditions=self.forces_of_conditions(residuals.conditions)
         )
 
-    def forced(self, c: list[Array]) -> list[Array]:
+    def forces_of_conditions(self, c: list[Array]) -> list[Array]:
         """mu + rho c of the conditions."""
         return [mu + self.penalty * each for mu, each in zip(self.conditions, c, strict=True)]
 

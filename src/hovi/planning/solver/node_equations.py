@@ -34,7 +34,7 @@ class NodeEquations:
 
     @classmethod
     def of(cls, equations: Sequence[Equation], grid: Grid) -> list[NodeEquations]:
-        """Those of consecutive equations with the same function and value."""
+        """Those of consecutive equations with the same function and value, at other nodes."""
 
         def alike(each: Equation) -> tuple[int, int, bool]:
             return id(each.y), id(each.on), each.where.node == grid.intervals
@@ -88,5 +88,4 @@ class NodeEquations:
     def _states(self, x: DiscretePath) -> Points:
         nodes = [each.where.node for each in self.given]
         times = np.array([each.where.time for each in self.given])
-        a, jerk = (*np.moveaxis(x.rates[nodes, 1:], 1, 0), None, None)[:2]
-        return _new_points(x.q[nodes], x.v[nodes], times, a, None, jerk)
+        return _new_points(x.q[nodes], x.v[nodes], times)

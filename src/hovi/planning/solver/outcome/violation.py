@@ -81,7 +81,7 @@ def _by_approaches(
 
 
 def _along(given: Condition[Any, Any], motion: Trajectory, problem: TrajectoryProblem) -> str:
-    """By samples; torques of passive joints by moments, relative to the largest torque."""
+    """Of values by samples; of passive torques by moments, relative to the largest torque."""
     if "tau" not in given.y.needs:
         found = worst_along([given], motion)
         return found.clause and f"{found.subject} is violated: {found.clause}"
