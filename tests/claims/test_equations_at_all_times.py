@@ -264,12 +264,20 @@ def off(q: Array) -> Array:
     return q + np.array([0.0, 0.02, 0.0, 0.0, 0.0, 0.0])
 
 
+def via(q: Array) -> hovi.Via:
+    return hovi.Via(0.7, hovi.State(q))
+
+
 CANNOT: dict[str, tuple[Callable[[dict[str, Any]], dict[str, Any]], str]] = {
     "start": (lambda x: {"start": off(x["q0"])}, "at the start, where a motion cannot change that"),
     "goal": (lambda x: {"goal": off(x["q1"])}, "at the goal, where a motion cannot change that"),
     "velocity": (
         lambda x: {"start": hovi.State(x["q0"], [0.1] * 6)},
         "per second at the start, where it should stay: change the velocity there",
+    ),
+    "via": (
+        lambda x: {"via": [via(off(0.5 * (x["q0"] + x["q1"])))]},
+        "at the motion at t = 0.7 s, where a motion cannot change that",
     ),
     "frame": (
         lambda x: {"goal": hovi.FrameGoal("tool0", position=np.add(x["goal"], [0.05, 0, 0]))},
@@ -283,8 +291,9 @@ CANNOT: dict[str, tuple[Callable[[dict[str, Any]], dict[str, Any]], str]] = {
 def test_what_cannot_be_is_infeasible_at_once(line: dict[str, Any], what: str, limits: str) -> None:
     changes, sentence = CANNOT[what]
     ends = {"start": line["q0"], "goal": line["q1"]} | changes(line)
-    asked: dict[str, Any] = {"limits": limits, "conditions": line["line"]}
-    found = hovi.plan(line["scene"], ends["start"], ends["goal"], 1.5, **asked)
+    start, goal = ends.pop("start"), ends.pop("goal")
+    asked: dict[str, Any] = {"limits": limits, "conditions": line["line"]} | ends
+    found = hovi.plan(line["scene"], start, goal, 1.5, **asked)
     assert found.status is hovi.Status.INFEASIBLE
     assert sentence in found.message
     assert found.nit == 0
@@ -337,3 +346,42 @@ def test_a_motion_on_a_line_can_be_pickled(line: dict[str, Any]) -> None:
     again = pickle.loads(pickle.dumps(found)).replan()
     assert again.success, again.message
     assert again.cost == pytest.approx(found.cost, rel=1e-9)
+
+
+@pytest.mark.parametrize("limits", ["none", "urdf"])
+def test_the_unit_of_a_condition_does_not_matter(line: dict[str, Any], limits: str) -> None:
+    found = []
+    for unit in (1e-3, 1.0, 1e3):
+        asked = [
+            hovi.Condition(
+                f'{unit!r} * position["tool0", "{axis}"]',
+                hovi.Equal(unit * line["point"][AXES.index(axis)]),
+                name=axis,
+                tolerance=max(1e-6, 1e-6 * unit),
+            )
+            for axis in "xz"
+        ]
+        ends = line["scene"], line["q0"], line["q1"], 1.5
+        more: dict[str, Any] = {"limits": limits, "self_collision": False}
+        found.append(hovi.plan(*ends, conditions=asked, **more))
+    assert all(each.success for each in found), [each.message for each in found]
+    assert max(each.nit for each in found) < 1.2 * min(each.nit for each in found)
+    assert np.ptp([each.cost for each in found]) < 1e-3 * found[0].cost
+
+
+@pytest.mark.parametrize("limits", ["none", "urdf"])
+def test_what_is_left_of_a_coarse_motion_is_planned(limits: str) -> None:
+    """Between the nodes it misses the equation by less than its tolerance, at some rate."""
+    found = on_curve(0, scheme="galerkin-1", intervals=6, room=6e-5, limits=limits)
+    assert found.success, found.message
+    for elapsed in np.linspace(0.02, 1.1, 13).tolist():
+        left = found.advance(elapsed)
+        assert left.success, (elapsed, left.message)
+
+
+@pytest.mark.parametrize("scheme", ["galerkin-0", "taylor-midpoint"])
+def test_an_interval_without_unknowns_and_equations_is_planned(scheme: str) -> None:
+    found = on_curve(0, scheme=scheme, intervals=16, room=1e-2)
+    left = found.advance(1.15)
+    assert left.trajectory.grid.intervals == 1
+    assert left.violation == ""
