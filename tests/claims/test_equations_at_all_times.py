@@ -7,6 +7,7 @@ of velocities and of accelerations that follow from this one.
 
 from __future__ import annotations
 
+import dataclasses
 import pickle
 from collections.abc import Callable
 from functools import cache
@@ -385,3 +386,20 @@ def test_an_interval_without_unknowns_and_equations_is_planned(scheme: str) -> N
     left = found.advance(1.15)
     assert left.trajectory.grid.intervals == 1
     assert left.violation == ""
+
+
+def test_a_grid_is_refined_for_it_alone(line: dict[str, Any]) -> None:
+    """The first grid is fine enough for a loose tolerance of the cost."""
+    ends = line["scene"], line["q0"], line["q1"], 1.5
+    asked: dict[str, Any] = {"limits": "none", "self_collision": False, "tolerance": 0.05}
+    found = [
+        hovi.plan(
+            *ends,
+            conditions=[dataclasses.replace(x, tolerance=room) for x in line["line"]],
+            **asked,
+        )
+        for room in (1e-2, 1e-6)
+    ]
+    assert all(each.success for each in found), [each.message for each in found]
+    assert found[0].margins().missed["x"] > 1e-6
+    assert found[1].margins().missed["x"] < 1e-6

@@ -162,7 +162,7 @@ class _Part:
             )
         return (
             f"{name} is missed by {size:.3g} at {state.name}, where a motion cannot change that: "
-            f"change {state.name}"
+            f"change {state.name} or the value"
         )
 
 

@@ -13,6 +13,7 @@ from hovi.planning.problem.contradictions import contradiction
 from hovi.planning.problem.limits import no_limits
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.answer import Answer, answered
+from hovi.planning.solver.augmented_lagrangian_rounds import missed_sentence
 from hovi.planning.solver.methods.active_pairs import with_active_pairs
 from hovi.planning.solver.methods.bounded_search import BoundedSearch
 from hovi.planning.solver.methods.feasibility import feasible_motion
@@ -120,6 +121,7 @@ def _ended(search: BoundedSearch, why: Reason) -> Answer:
     problem, path = search.last
     value, nit = cost_of(problem, path), search.iterations
     status, message = _unfinished(why, nit, value)
+    message += missed_sentence(problem, path) if problem.constrained else ""
     return Answer(problem, path, value, status, message, nit, history=search.history)
 
 
