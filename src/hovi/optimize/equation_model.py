@@ -21,7 +21,7 @@ from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 
-SOFTNESS = 1e-6
+SOFTNESS = 1e-4
 """delta times the penalty."""
 
 
@@ -40,11 +40,19 @@ class EquationModel(QuadraticModel):
     """A banded model whose Newton steps satisfy equations; those with a shift are its own.
 
     kkt: the same with the equations. residual: c, shape (E,). penalty: of c^2 / 2 in the model.
+    stiffness: by how much less delta is, for each equation or all.
     """
 
-    def __init__(self, inner: BandModel, kkt: KktModel, residual: Array, penalty: float) -> None:
+    def __init__(
+        self,
+        inner: BandModel,
+        kkt: KktModel,
+        residual: Array,
+        penalty: float,
+        stiffness: Array | float = 1.0,
+    ) -> None:
         self.inner, self.kkt, self.residual = inner, kkt, residual
-        self.delta = SOFTNESS / penalty
+        self.delta = SOFTNESS / penalty / stiffness
         self.intervals, self.gradient = inner.intervals, inner.gradient
         self._newton: EquationFactor | None = None
 

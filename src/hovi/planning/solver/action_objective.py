@@ -294,7 +294,7 @@ class ActionObjective(Objective[DiscretePath]):
         kkt = KktModel(model.intervals, rows, none, layout, *bands)
         penalty = known.torque_penalty if len(self.problem.passive) > 0 else known.penalty
         residual = equations.residual(x, self.outputs(x), self.jets(x))
-        return EquationModel(model, kkt, residual, penalty)
+        return EquationModel(model, kkt, residual, penalty, equations.stiffness)
 
     @cached_property
     def equations(self) -> Equations:

@@ -24,6 +24,9 @@ from hovi.scene.lagrangian import PointTerms
 
 Array = npt.NDArray[np.float64]
 
+MOMENT_STIFFNESS = 100.0
+"""Stiffness of moments of equations along the motion: see EquationModel."""
+
 
 class Equations:
     """The equations of a problem as rows of its intervals.
@@ -45,6 +48,16 @@ class Equations:
     def sizes(self) -> list[int]:
         """The sizes of `conditions`."""
         return [*(each.size for each in self.along), *(each.size for each in self.at_nodes)]
+
+    @property
+    def stiffness(self) -> Array:
+        """By how much less than a node each equation gives way, (E,): moments to high modes."""
+        known = self.moments
+        batches = 0 if known is None else len(known.batches)
+        torques = 0 if known is None else sum(known.size(i) for i in range(batches))
+        along = sum(each.size for each in self.along)
+        at_nodes = sum(each.size for each in self.at_nodes)
+        return np.repeat([1.0, MOMENT_STIFFNESS, 1.0], [torques, along, at_nodes])
 
     def residual(self, x: DiscretePath, outputs: list[Array], jets: Sequence[Jet]) -> Array:
         """c at a path, with the Lagrangian's outputs and (q, v, a) at its points."""
