@@ -35,6 +35,7 @@ class AlongMoments:
 
     def __init__(self, problem: TrajectoryProblem, given: EquationAlong, size: Array) -> None:
         self._given, self._ld, self._size = given, problem.ld, size
+        self._last: tuple[Sequence[Jet], dict[int, Array]] | None = None
         self._parts = list[tuple[int, IntervalMoments, Array]]()
         for i, batch in enumerate(problem.ld.interval_batches):
             count, level = batch.modes + given.where.level, given.where.level
@@ -88,6 +89,11 @@ class AlongMoments:
         return _new_points(q, v, self._ld.point_times[batch], a)
 
     def _slopes(self, jets: Sequence[Jet], batch: int) -> Array:
-        """dy / d(q, v, a) at the points, (P, size, 3 nv)."""
-        at = self._points(jets, batch)
-        return jet_slopes(self._given.y.slopes(at), None, self._given.y.size, at)
+        """dy / d(q, v, a) at the points, (P, size, 3 nv); cached for the last motion."""
+        if self._last is None or self._last[0] is not jets:
+            self._last = jets, {}
+        known = self._last[1]
+        if batch not in known:
+            at = self._points(jets, batch)
+            known[batch] = jet_slopes(self._given.y.slopes(at), None, self._given.y.size, at)
+        return known[batch]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -79,13 +80,19 @@ class NodeEquations:
             if i != j:
                 hessian[self.intervals, first + j, first + i] += scaled.transpose(0, 2, 1)
 
-    @property
+    @cached_property
     def _scale(self) -> Array:
         """Of q and v in the columns (q, h v), (B, 2)."""
         steps = self.grid.steps[self.intervals]
         return np.stack([np.ones_like(steps), 1.0 / steps], axis=1)
 
+    @cached_property
+    def _nodes(self) -> npt.NDArray[np.intp]:
+        return np.array([each.where.node for each in self.given])
+
+    @cached_property
+    def _times(self) -> Array:
+        return np.array([each.where.time for each in self.given])
+
     def _states(self, x: DiscretePath) -> Points:
-        nodes = [each.where.node for each in self.given]
-        times = np.array([each.where.time for each in self.given])
-        return _new_points(x.q[nodes], x.v[nodes], times)
+        return _new_points(x.q[self._nodes], x.v[self._nodes], self._times)

@@ -35,8 +35,8 @@ def require_supported(problem: ProblemSummary, order: int) -> None:
             f"{' and '.join(named)} need a Lagrangian of order 2 or 3, and this one is of order "
             f"{order}: leave them out."
         )
+    periodic = isinstance(problem.goal, Periodic)
     for each in problem.conditions:
-        periodic = isinstance(problem.goal, Periodic)
         if isinstance(each.where, Along) and (order != 2 or periodic):
             what = "a periodic motion" if periodic else f"a cost of order {order}"
             raise InputError(
