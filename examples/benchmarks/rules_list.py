@@ -427,32 +427,10 @@ _rule(
     "_newton_step",
     "_step",
 )
-_at("equations", "planning.solver.augmented_lagrangian_rounds")
-_rule(
-    "large penalty for a warm guess",
-    "A guess that nearly has no passive torque begins with a thousandfold penalty.",
-    "first_multipliers",
-    "fraction <= WARM_TORQUE_FRACTION",
-    "False",
-)
-_rule(
-    "first rounds stop early",
-    "Rounds stop by their residual, not at full accuracy.",
-    "minimize_constrained",
-    "float(np.clip(max(sizes) ** 2, 1e-12, FIRST_DECREASE))",
-    "1e-12",
-)
-_rule(
-    "end where penalties have no effect",
-    "Two larger penalties without effect end the rounds.",
-    "minimize_constrained",
-    "max(stuck) >= MAX_STUCK or _at_maximum_penalty(multipliers, first, slow)",
-    "_at_maximum_penalty(multipliers, first, slow)",
-)
 _at("equations", "planning.solver.methods.lagrange_newton")
 _rule(
     "Lagrange-Newton",
-    "Equations without limits by Newton's method on the KKT equations, not by rounds.",
+    "Equations without limits by Newton's method on the KKT equations, not by the interior point.",
     "LagrangeNewton.supports",
     "problem.constrained and not problem.limited",
     "False",
@@ -470,21 +448,6 @@ _rule(
     "_minimized",
     "_multipliers(start, objective)",
     "None",
-)
-_at("equations", "planning.solver.methods.bounded_search")
-_rule(
-    "rounds begin where the last ended",
-    "Each round within limits begins with the slacks and multipliers of the last.",
-    "BoundedSearch.solve",
-    "len(y) == len(barrier.s) == len(objective.bounds.lower)",
-    "False",
-)
-_rule(
-    "larger last mu in rounds",
-    "Rounds have a last barrier parameter of at least 3e-7.",
-    "BoundedSearch.solve",
-    "max(ROUND_BARRIER, criteria.barrier)",
-    "criteria.barrier",
 )
 _at("warm starts", "planning.solver.methods.bounded_search")
 _rule(

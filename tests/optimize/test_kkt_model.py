@@ -9,7 +9,7 @@ import scipy.linalg
 from hovi._native import band as native
 from hovi.optimize.banded_model import BandLayout
 from hovi.optimize.bordered_model import Border, BorderedModel
-from hovi.optimize.equation_model import SOFTNESS, EquationFactor, EquationModel
+from hovi.optimize.equation_model import NORMAL, EquationFactor, EquationModel, PenaltyModel
 from hovi.optimize.kkt_model import ConstraintRows, KktLayout, KktModel
 from hovi.optimize.quadratic_model import IntervalSum
 
@@ -198,19 +198,18 @@ def test_a_matrix_without_a_pivot_has_no_factor(portable: bool) -> None:
 
 
 def under_equations(
-    penalty: float = 1e3, repeated: bool = False, curvature: float = 0.0
+    repeated: bool = False, curvature: float = 0.0
 ) -> tuple[EquationModel, Array, Array]:
     """A model whose Newton steps satisfy equations, its dense Hessian, and A."""
     of = model(repeated=repeated, curvature=curvature)
     H, A, _ = dense(of)
     c = A @ np.random.default_rng(2).standard_normal(len(H))
-    return EquationModel(of.plain, of, c, penalty), H, A
+    return EquationModel(of.plain, of, c), H, A
 
 
-def test_newton_steps_under_equations_solve_the_softened_kkt_system() -> None:
+def test_newton_steps_under_equations_solve_the_kkt_system() -> None:
     steps, H, A = under_equations()
-    delta = SOFTNESS / 1e3
-    kkt = np.block([[H, A.T], [A, -delta * np.eye(len(A))]])
+    kkt = np.block([[H, A.T], [A, np.zeros((len(A), len(A)))]])
     s, z = np.split(
         np.linalg.solve(kkt, -np.append(steps.gradient, steps.residual)), [len(steps.gradient)]
     )
@@ -219,10 +218,9 @@ def test_newton_steps_under_equations_solve_the_softened_kkt_system() -> None:
     step, slope, length = steps.descend(factor)
     np.testing.assert_allclose(step, s, atol=1e-9 * np.abs(s).max())
     assert length == pytest.approx(step @ steps.metric_product(step), rel=1e-10)
-    reaction = steps.reaction(steps.gradient, step, factor)
-    assert reaction is not None
-    np.testing.assert_allclose(reaction[0], z, rtol=1e-7)
-    assert reaction[1] == pytest.approx(z @ steps.residual, rel=1e-7)
+    change, As = steps.reaction(steps.gradient, step, factor)
+    np.testing.assert_allclose(change, z, rtol=1e-7)
+    np.testing.assert_allclose(As, -steps.residual, atol=1e-9)
     # the decrease of the model is minus half the slope, as without equations
     decrease = -steps.gradient @ step - 0.5 * step @ H @ step
     assert -0.5 * slope == pytest.approx(decrease, rel=1e-9)
@@ -232,22 +230,74 @@ def test_newton_steps_under_equations_solve_the_softened_kkt_system() -> None:
 
 
 def test_equations_that_repeat_each_other_are_satisfied() -> None:
-    steps, _, A = under_equations(1e9, repeated=True)
+    steps, _, A = under_equations(repeated=True)
     factor = steps.factor(0.0)
     assert isinstance(factor, EquationFactor)
     step, _, _ = steps.descend(factor)
     np.testing.assert_allclose(A @ step, -steps.residual, rtol=0, atol=1e-9)
 
 
-def test_a_shift_leaves_equations_to_the_penalty() -> None:
-    steps, _, _ = under_equations()
-    factor = steps.factor(0.5)
+@pytest.mark.parametrize("radius", [np.inf, 0.3])
+def test_a_shift_keeps_what_takes_the_residual_away_within_the_radius(radius: float) -> None:
+    steps, H, A = under_equations()
+    D, shift, c = dense(steps.kkt)[2], 0.5, steps.residual
+    kkt = np.block([[H + shift * D, A.T], [A, np.zeros((len(A), len(A)))]])
+    size = len(steps.gradient)
+    normal = np.linalg.solve(kkt, np.append(np.zeros(size), -c))[:size]
+    fraction = min(1.0, NORMAL * radius / np.sqrt(normal @ D @ normal))
+    assert (fraction < 1.0) == np.isfinite(radius)
+    factor = steps.factor(shift)
     assert factor is not None
-    step, _, _ = steps.descend(factor)
-    plain = steps.inner.factor(0.5)
-    assert plain is not None
-    np.testing.assert_array_equal(step, steps.inner.descend(plain)[0])
-    assert steps.reaction(steps.gradient, step, factor) is None
+    step, slope, _ = steps.descend(factor, radius)
+    s, z = np.split(np.linalg.solve(kkt, -np.append(steps.gradient, fraction * c)), [size])
+    np.testing.assert_allclose(step, s, atol=1e-9 * np.abs(s).max())
+    assert slope == pytest.approx(steps.gradient @ s + fraction * z @ c, rel=1e-8)
+
+
+def test_multipliers_of_a_shifted_step_are_those_of_least_squares() -> None:
+    """As the shift grows; those of the step itself would grow with it."""
+    steps, _, A = under_equations()
+    D = dense(steps.kkt)[2]
+    factor = steps.factor(1e6)
+    assert factor is not None
+    step, _, _ = steps.descend(factor, 1e-3)
+    z, As = steps.reaction(steps.gradient, step, factor)
+    normal = A @ np.linalg.solve(D, A.T)
+    least = np.linalg.solve(normal, -A @ np.linalg.solve(D, steps.gradient))
+    np.testing.assert_allclose(z, least, rtol=1e-3)
+    np.testing.assert_allclose(As, A @ step, atol=1e-12 * np.abs(As).max())
+    np.testing.assert_allclose(As, -factor.fraction * steps.residual, rtol=1e-3)
+
+
+@pytest.mark.parametrize("shift", [0.0, 0.5])
+def test_a_penalty_adds_its_normal_matrix(shift: float) -> None:
+    of = model()
+    H, A, D = dense(of)
+    weight = 30.0
+    penalized = PenaltyModel(of.plain, of, weight)
+    gradient = of.plain.gradient
+    factor = penalized.factor(shift)
+    assert factor is not None
+    whole = H + weight * A.T @ A + shift * D
+    step, slope, length = penalized.descend(factor)
+    np.testing.assert_allclose(step, np.linalg.solve(whole, -gradient), rtol=1e-7)
+    assert slope == pytest.approx(gradient @ step, rel=1e-9)
+    assert length == pytest.approx(step @ D @ step, rel=1e-9)
+    assert not penalized.equations
+    negative = PenaltyModel(model(curvature=-12.0).plain, model(curvature=-12.0), 1e-3)
+    assert negative.factor(0.0) is None
+
+
+def test_a_correction_takes_away_what_is_left_beyond_the_linearised_residual() -> None:
+    steps, _, A = under_equations()
+    left = np.random.default_rng(5).standard_normal(len(A))
+    for shift, taken in ((0.0, 1.0), (0.5, 0.4)):
+        factor = steps.factor(shift)
+        assert factor is not None
+        steps.descend(factor, 0.3)
+        more = steps.correction(factor, taken, left)
+        wanted = (1.0 - taken * factor.fraction) * steps.residual
+        np.testing.assert_allclose(left + A @ more, wanted, atol=1e-9)
 
 
 def test_curvature_across_equations_alone_needs_to_be_positive() -> None:
@@ -277,14 +327,15 @@ def bordered(
 def test_newton_steps_with_one_more_unknown_solve_its_kkt_system(room: tuple[float, float]) -> None:
     model, H, A = bordered(50.0, room)
     assert isinstance(model.inner, EquationModel)
-    delta, residual = SOFTNESS / 1e3, model.inner.residual
+    residual = model.inner.residual
     factor = model.factor(0.0)
     step, slope, _ = model.descend(factor)
     assert room[0] <= step[-1] <= room[1]
     free = np.ones(len(H), dtype=bool)
     free[-1] = abs(step[-1]) < room[1]
     expected, held = step.copy(), step[~free]
-    kkt = np.block([[H[np.ix_(free, free)], A[:, free].T], [A[:, free], -delta * np.eye(len(A))]])
+    none = np.zeros((len(A), len(A)))
+    kkt = np.block([[H[np.ix_(free, free)], A[:, free].T], [A[:, free], none]])
     force = model.gradient[free] + H[np.ix_(free, ~free)] @ held
     solved = np.linalg.solve(kkt, -np.append(force, residual + A[:, ~free] @ held))
     expected[free] = solved[: free.sum()]
@@ -292,12 +343,16 @@ def test_newton_steps_with_one_more_unknown_solve_its_kkt_system(room: tuple[flo
     assert free[-1] == (room[1] > 1)
     assert free[-1] or outward < 0
     np.testing.assert_allclose(step, expected, atol=1e-7 * np.abs(expected).max())
+    z, As = model.reaction(model.gradient, step, factor)
     decrease = -model.gradient @ step - 0.5 * step @ H @ step
     assert -0.5 * slope == pytest.approx(decrease, rel=1e-4)
-    z, product = model.reaction(model.gradient, step, factor)
+    assert model.curvature(step) == pytest.approx(step @ H @ step, rel=1e-9)
+    more = model.correction(factor, 1.0, residual)
+    assert more[-1] == 0.0
+    np.testing.assert_allclose(A @ more, -residual, atol=1e-9)
     left = H[:-1] @ step + A[:, :-1].T @ z + model.gradient[:-1]
     np.testing.assert_allclose(left, 0.0, atol=1e-8 * np.abs(model.gradient).max())
-    assert product == pytest.approx(z @ residual, rel=1e-9)
+    np.testing.assert_allclose(As, -residual, atol=1e-9)
 
 
 def test_the_inertia_with_one_more_unknown_is_that_of_the_tangent_space() -> None:

@@ -6,6 +6,7 @@ Cholesky factorisation gives the step and decides definiteness at once.
 
 from __future__ import annotations
 
+import math
 from functools import cached_property
 
 import numpy as np
@@ -198,7 +199,7 @@ class BandModel(QuadraticModel):
         native.product(self._metric_band, self.layout.rows, np.ascontiguousarray(s), product)
         return product
 
-    def descend(self, factor: Factor) -> tuple[Array, float, float]:
+    def descend(self, factor: Factor, radius: float = math.inf) -> tuple[Array, float, float]:
         """The step, slope and squared length of `QuadraticModel.descend`, in one compiled pass."""
         if not isinstance(factor, BandFactor):
             return super().descend(factor)

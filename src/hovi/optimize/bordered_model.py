@@ -9,6 +9,8 @@ P are.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import numpy.typing as npt
 
@@ -70,7 +72,7 @@ class BorderedModel(QuadraticModel):
     def __init__(self, inner: BandModel | EquationModel, border: Border) -> None:
         self.inner = inner
         self.border = border
-        self.intervals = inner.intervals
+        self.equations, self.intervals = inner.equations, inner.intervals
         self.gradient = np.append(inner.gradient, border.slope)
         self.size = len(inner.gradient)
 
@@ -103,14 +105,14 @@ class BorderedModel(QuadraticModel):
                 return None
         return BorderedFactor(inner, border.columns, solved, pivot, free)
 
-    def descend(self, factor: Factor) -> tuple[Array, float, float]:
+    def descend(self, factor: Factor, radius: float = math.inf) -> tuple[Array, float, float]:
         """The minimum of the model with shift, t within its room; see QuadraticModel.descend.
 
         Where bounds of t hold with multipliers m, m.t is added to the slope, so that the decrease
         is -slope/2 + shift/2 times the length squared in any case.
         """
         assert isinstance(factor, BorderedFactor)
-        x, slope, _ = self.inner.descend(factor.inner)
+        x, slope, _ = self.inner.descend(factor.inner, radius)
         rate, free = self._slope_at(x), factor.free
         t, own = np.zeros(len(free)), np.ix_(free, free)
         low, high = self.border.room
@@ -128,14 +130,22 @@ class BorderedModel(QuadraticModel):
         low, high = self.border.room
         return np.asarray(~(((low == 0) & (slope > 0)) | ((high == 0) & (slope < 0))))
 
-    def reaction(
-        self, gradient: Array, s: Array, factor: Factor | None
-    ) -> tuple[Array, float] | None:
+    def reaction(self, gradient: Array, s: Array, factor: Factor | None) -> tuple[Array, Array]:
         """That of the inner model for the gradient g + B t, with the step t."""
-        if not isinstance(factor, BorderedFactor):
-            return None
+        assert isinstance(factor, BorderedFactor)
         x, t = s[: self.size], s[self.size :]
         return self.inner.reaction(gradient[: self.size] + self.border.columns @ t, x, factor.inner)
+
+    def correction(self, factor: Factor | None, taken: float, residual: Array) -> Array:
+        """That of the inner model."""
+        assert isinstance(factor, BorderedFactor)
+        still = np.zeros_like(self.border.slope)
+        return np.append(self.inner.correction(factor.inner, taken, residual), still)
+
+    def curvature(self, s: Array) -> float:
+        """s.H s, of the bordered H."""
+        border, x, t = self.border, s[: self.size], s[self.size :]
+        return self.inner.curvature(x) + float(t @ (2 * border.columns.T @ x + border.corner @ t))
 
     def curvature_scale(self) -> float:
         """That of the other unknowns."""

@@ -83,6 +83,10 @@ class BoundedObjective(ABC, Generic[X]):
         """Add a change to the multipliers of equations; returns what it adds to the value at x."""
         return 0.0
 
+    def residual(self, x: X) -> Array:
+        """c of equations at x, shape (E,)."""
+        return np.zeros(0)
+
     def satisfies_equations(self, x: X) -> bool:
         """Whether equations hold at x to their tolerance; true without any."""
         return True

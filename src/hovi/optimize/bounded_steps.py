@@ -49,6 +49,10 @@ CUT_RADIUS = 10.0
 """The largest radius after such a step, relative to what was left of it."""
 LEAST_CUT_RADIUS = 1e-3
 """The least radius after such a step."""
+WEIGHED = 0.3
+"""What a step predicts at least, relative to the decrease of |c|^2 with its weight."""
+NONE = np.zeros(0)
+"""The residual where there are no equations."""
 SHORTENED = 0.3
 """Ratio of the radius after such a step while outputs are not matched; its square, where the step
 was refused."""
@@ -62,7 +66,9 @@ class BoundedStep:
     decrease: predicted decrease of the merit function.
     remaining: decrease that the whole direction predicts for the objective with its barrier.
     barrier: of the current point, with the mu that the step aims at. before: its merit there.
+    targets: of the products of multipliers and gaps.
     reaction: change of the multipliers of equations that goes with it; None without any.
+    weight: of |c|^2 / 2 in the merit function.
     """
 
     trial: Trial
@@ -72,7 +78,9 @@ class BoundedStep:
     remaining: float
     barrier: Barrier
     before: float
+    targets: Pair
     reaction: Array | None = None
+    weight: float = 0.0
 
 
 class BoundedSteps(Generic[X]):
@@ -109,8 +117,9 @@ class BoundedSteps(Generic[X]):
         """
         ended = self.ended
         sigma, rho, force = ended.z.condensed(ended.outputs.y)
-        self.sigma, self.rho, self.exact = sigma, rho, True
+        self.sigma, self.rho, self.force, self.exact = sigma, rho, force, True
         model = self.objective.model(ended.x, sigma, rho, force)
+        self.residual = self.objective.residual(ended.x) if model.equations else NONE
         known = self.exact_from_now_on or not self.objective.may_be_concave
         if known or model.factor(0.0) is not None:
             return model
@@ -184,21 +193,25 @@ class BoundedSteps(Generic[X]):
         slope = float(np.vdot(model.gradient, s)) - float(np.vdot(weights * self.rho, along.dy))
         gradient = model.gradient if pulled is None else model.gradient + pulled
         norm2 = trial.norm**2 if pulled is None else float(np.vdot(s, model.metric_product(s)))
-        whole, reaction = -float(np.vdot(gradient, s)), model.reaction(gradient, s, trial.factor)
-        reacted = 0.0 if reaction is None else reaction[1]
-        whole += reacted
-        square = whole - trial.shift * norm2
+        change, As = self._reaction(trial, s, gradient, model)
+        reacted = 0.0 if change is None else -float(change @ As)
+        whole = reacted - float(np.vdot(gradient, s))
+        square = model.curvature(s) if model.equations else whole - trial.shift * norm2
         square -= float(np.vdot(weights * self.sigma, along.dy**2))
-        before = barrier.merit(y, self.penalty, along, 0.0)
+        before, weight = barrier.merit(y, self.penalty, along, 0.0), 0.0
 
         def decrease(fraction: float) -> float:
             # the merit function has the multipliers after the step
             smooth = fraction * (slope - reacted) + 0.5 * fraction**2 * square
+            smooth -= weight * self._residual_decrease(fraction, As)
             return before - barrier.merit(y, self.penalty, along, fraction) - smooth
 
         inside = along.primal >= 1.0  # a slack at the end of a whole step is kept off its bound
         longest = 1.0 if inside else barrier.boundary_fraction * along.primal
         fraction, predicted = longest, decrease(longest)
+        if predicted < -10 * self.noise and change is not None:
+            weight = self._weight(predicted, self._residual_decrease(longest, As))
+            predicted = decrease(longest)
         for shorter in SHORTER_FRACTIONS:
             if abs(predicted) <= 10 * self.noise or (pulled is not None and predicted > 0):
                 break
@@ -207,8 +220,35 @@ class BoundedSteps(Generic[X]):
                 break
             fraction, predicted = shorter * longest, other
         trial = trial._replace(step=s, norm=math.sqrt(max(norm2, 0.0)))
-        change = None if reaction is None else reaction[0]
-        return BoundedStep(trial, along, fraction, predicted, 0.5 * whole, barrier, before, change)
+        if weight > 0.0:
+            before += 0.5 * weight * float(self.residual @ self.residual)
+        ends = barrier, before, targets, change, weight
+        return BoundedStep(trial, along, fraction, predicted, 0.5 * whole, *ends)
+
+    def _reaction(
+        self, trial: Trial, s: Array, gradient: Array, model: QuadraticModel
+    ) -> tuple[Array | None, Array]:
+        """The change of the multipliers of equations, None without, and A s.
+
+        A step that is kept within a radius has those of least squares, for the forces of the bounds
+        as they are: rho of a slack at its bound is a stiff penalty, which no multiplier balances.
+        """
+        if not model.equations:
+            return None, self.residual
+        if not trial.newton:
+            gradient = gradient + self.objective.pull(self.force - self.rho, model)
+        return model.reaction(gradient, s, trial.factor)
+
+    def _residual_decrease(self, fraction: float, As: Array) -> float:
+        """The decrease of |c|^2 / 2 that a fraction of a step predicts."""
+        return -fraction * float((self.residual + 0.5 * fraction * As) @ As)
+
+    def _weight(self, predicted: float, gain: float) -> float:
+        """The weight of |c|^2 / 2 with which a step predicts a decrease.
+
+        predicted: without. gain: decrease of |c|^2 / 2.
+        """
+        return -predicted / ((1.0 - WEIGHED) * gain) if gain > 0.0 else 0.0
 
     def radius_after(self, step: BoundedStep, ratio: float) -> float:
         """The radius after a step, which the bounds may have cut."""

@@ -1,15 +1,17 @@
-"""A quadratic model of an augmented Lagrangian, whose Newton steps satisfy linearised equations.
+"""Quadratic models of Lagrangians f + y.c, whose steps satisfy linearised equations c.
 
-For K, which includes the penalty of the equations c, and with their multipliers' change z,
+With the change z of their multipliers,
 
-    [K, A^T; A, -delta I] [s; z] = [-g; -c].
+    [H + shift D, A^T; A, 0] [s; z] = [-g; -c].
 
-Combinations of equations whose eigenvalue of A K^-1 A^T is far below delta are left to the penalty.
-It is nearly 1 / penalty where nothing holds a combination back. Where bounds do, steps that satisfy
-it would be cut to nothing, and its multiplier would grow without end.
+Where a shift keeps the step within a radius, what takes c away has at most a part of that radius,
+and only a fraction of c is taken away [NocedalWright2006, section 18.5]. The multipliers that go
+with such a step are those of least squares: those of the step itself grow with the shift.
 """
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 import numpy.typing as npt
@@ -21,40 +23,35 @@ from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 
-SOFTNESS = 1e-4
-"""delta times the penalty."""
+NORMAL = 0.8
+"""Largest length of what takes c away, relative to the radius."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class EquationFactor:
-    """A factorisation for steps that keep equations: A s = 0."""
+    """A factorisation for steps that keep equations: A s = 0.
+
+    shift: of D. fraction: of c that the last step of the model takes away.
+    """
 
     kkt: KktFactor
+    shift: float
+    fraction: float = 1.0
 
     def solve(self, rhs: Array) -> Array:
         """The step for a force that changes no equation."""
         return self.kkt.solve(rhs, np.zeros(len(self.kkt.layout.multipliers)))[0]
 
 
-class EquationModel(QuadraticModel):
-    """A banded model whose Newton steps satisfy equations; those with a shift are its own.
+class _WithEquations(QuadraticModel):
+    """A banded model, and equations beside it.
 
-    kkt: the same with the equations. residual: c, shape (E,). penalty: of c^2 / 2 in the model.
-    stiffness: by how much less delta is, for each equation or all.
+    kkt: the same with the equations.
     """
 
-    def __init__(
-        self,
-        inner: BandModel,
-        kkt: KktModel,
-        residual: Array,
-        penalty: float,
-        stiffness: Array | float = 1.0,
-    ) -> None:
-        self.inner, self.kkt, self.residual = inner, kkt, residual
-        self.delta = SOFTNESS / penalty / stiffness
+    def __init__(self, inner: BandModel, kkt: KktModel) -> None:
+        self.inner, self.kkt = inner, kkt
         self.intervals, self.gradient = inner.intervals, inner.gradient
-        self._newton: EquationFactor | None = None
 
     def scatter(self, local: Array) -> Array:
         """As that of the model alone."""
@@ -68,36 +65,76 @@ class EquationModel(QuadraticModel):
         """D s."""
         return self.inner.metric_product(s)
 
-    def factor(self, shift: float) -> Factor | None:
-        """That of H + shift D, with equations for a shift of zero, which is cached."""
-        if shift != 0.0:
-            return self.inner.factor(shift)
-        if self._newton is None:
-            found = self.kkt.factor(0.0, self.delta)
-            self._newton = None if found is None else EquationFactor(found)
-        return self._newton
-
-    def descend(self, factor: Factor) -> tuple[Array, float, float]:
-        """See QuadraticModel.descend; z (c - delta z) is added to the slope, for the equations."""
-        if not isinstance(factor, EquationFactor):
-            return self.inner.descend(factor)
-        s, z = factor.kkt.solve(-self.gradient, -self.residual)
-        slope = float(self.gradient @ s) + float(z @ (self.residual - self.delta * z))
-        return s, slope, float(s @ self.metric_product(s))
-
-    def reaction(
-        self, gradient: Array, s: Array, factor: Factor | None
-    ) -> tuple[Array, float] | None:
-        """z of a step for a gradient, and z c; None for a step without equations."""
-        if not isinstance(factor, EquationFactor):
-            return None
-        z = factor.kkt.solve(-gradient, -self.residual)[1]
-        return z, float(z @ self.residual)
-
     def curvature_scale(self) -> float:
         """That of the model alone."""
         return self.inner.curvature_scale()
 
+
+class EquationModel(_WithEquations):
+    """A banded model whose steps satisfy equations. residual: c, shape (E,)."""
+
+    equations = True
+
+    def __init__(self, inner: BandModel, kkt: KktModel, residual: Array) -> None:
+        super().__init__(inner, kkt)
+        self.residual = residual
+        self._newton: EquationFactor | None = None
+
+    def factor(self, shift: float) -> EquationFactor | None:
+        """That of H + shift D under the equations, cached for a shift of zero.
+
+        None where it is not positive definite on A s = 0.
+        """
+        if shift == 0.0 and self._newton is not None:
+            return self._newton
+        found = self.kkt.factor(shift)
+        factor = None if found is None else EquationFactor(found, shift)
+        if shift == 0.0:
+            self._newton = factor
+        return factor
+
+    def descend(self, factor: Factor, radius: float = math.inf) -> tuple[Array, float, float]:
+        """See QuadraticModel.descend; -z.A s is added to the slope, for the equations."""
+        assert isinstance(factor, EquationFactor)
+        g, c = self.gradient, self.residual
+        s, z = factor.kkt.solve(-g, -c)
+        if factor.shift > 0.0:
+            n, y = factor.kkt.solve(np.zeros_like(g), -c)
+            length = math.sqrt(max(float(n @ self.metric_product(n)), 0.0))
+            factor.fraction = min(1.0, NORMAL * radius / length) if length > 0.0 else 1.0
+            s, z = s - (1.0 - factor.fraction) * n, z - (1.0 - factor.fraction) * y
+        slope = float(g @ s) + factor.fraction * float(z @ c)
+        return s, slope, float(s @ self.metric_product(s))
+
+    def reaction(self, gradient: Array, s: Array, factor: Factor | None) -> tuple[Array, Array]:
+        """See QuadraticModel.reaction."""
+        assert isinstance(factor, EquationFactor)
+        c = self.residual if factor.shift == 0.0 else np.zeros_like(self.residual)
+        return factor.kkt.solve(-gradient, -c)[1], self.kkt.jacobian_product(s)
+
+    def correction(self, factor: Factor | None, taken: float, residual: Array) -> Array:
+        """See QuadraticModel.correction."""
+        assert isinstance(factor, EquationFactor)
+        target = (1.0 - taken * factor.fraction) * self.residual - residual
+        return factor.kkt.solve(np.zeros_like(self.gradient), target)[0]
+
     def negative_eigenvalues(self, border: tuple[Array, Array] | None = None) -> int:
         """Number of negative eigenvalues of H, or [H B; B^T C], on the tangent space A s = 0."""
         return self.kkt.negative_eigenvalues(border)
+
+
+class PenaltyModel(_WithEquations):
+    """A banded model at the multipliers y = weight c, with weight A^T A added to H.
+
+    It is the exact one of f + weight |c|^2 / 2, as what [H, A^T; A, -1 / weight] leaves of H.
+    weight: not zero.
+    """
+
+    def __init__(self, inner: BandModel, kkt: KktModel, weight: float) -> None:
+        super().__init__(inner, kkt)
+        self.weight = weight
+
+    def factor(self, shift: float) -> EquationFactor | None:
+        """That of H + weight A^T A + shift D; None where it is not positive definite."""
+        found = self.kkt.factor(shift, 1.0 / self.weight)
+        return None if found is None else EquationFactor(found, shift)

@@ -28,16 +28,17 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable
-from typing import TypeVar
+from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
-from hovi.optimize.barrier import Barrier
+from hovi.optimize.barrier import Barrier, Direction
 from hovi.optimize.bounded_objective import BoundedObjective, Refinement
 from hovi.optimize.bounded_steps import SHORT_FRACTION, BoundedStep, BoundedSteps
 from hovi.optimize.criteria import Criteria
-from hovi.optimize.ended import FEASIBILITY_TOLERANCE, Ended, Iteration, Reason
+from hovi.optimize.ended import FEASIBILITY_TOLERANCE, Ended, Iteration, Outputs, Reason
+from hovi.optimize.kkt_model import size_of
 from hovi.optimize.quadratic_model import QuadraticModel, decrease_ratio, next_shift
 from hovi.optimize.start import Start
 from hovi.system.deadline import raise_if_late
@@ -84,6 +85,9 @@ MAX_FORCE = 1e12
 """Multiplier, relative to the mean density, above which the bounds are taken as impossible."""
 MAX_STALLED_STEPS = 12
 """Consecutive refused steps after which the iteration ends as diverged."""
+CURVED = 0.5
+"""Ratio of the actual and the predicted decrease below which a step under equations is corrected
+for their curvature."""
 MAX_UNMET = 4
 """Steps that predict next to nothing after which it ends although equations do not hold."""
 MAX_SADDLES = 5
@@ -111,6 +115,16 @@ def minimize_bounded(
         criteria = dataclasses.replace(criteria, radius=cold if start.z is None else warm)
         _Iteration(objective, ended, criteria, density, report).run()
     return ended
+
+
+class _Reached(NamedTuple, Generic[X]):
+    """A point that a step leads to, its outputs and barrier, and the merit function there."""
+
+    step: Array
+    x: X
+    outputs: Outputs
+    barrier: Barrier
+    merit: float
 
 
 class _Iteration(BoundedSteps[X]):
@@ -169,25 +183,20 @@ class _Iteration(BoundedSteps[X]):
                 model = self.model()
 
     def _try(self, step: BoundedStep, model: QuadraticModel) -> bool:
-        ended, trial, along = self.ended, step.trial, step.along
-        barrier = step.barrier
-        moved_step = step.fraction * trial.step
-        x = self.objective.retract(ended.x, moved_step, model)
-        before = ended.outputs.value + self._hold(step.reaction, 1.0)
+        ended, trial = self.ended, step.trial
+        before = ended.outputs.value + step.before + self._hold(step.reaction, 1.0)
         try:
-            outputs = self.objective.outputs(x)
+            there = self._reached(step, step.along, step.fraction * trial.step, model)
+            corrected = self._corrected_step(step, there, before, model)
         except BaseException:  # the multipliers stay those of the current point
             self._hold(step.reaction, -1.0)
             raise
-        old = before + step.before
-        new, moved = math.inf, barrier
-        if np.isfinite(outputs.value):
-            moved = barrier.moved(outputs.y, along, step.fraction, self.penalty)
-            new = outputs.value + moved.merit(outputs.y, self.penalty, along, 0.0)
-        ratio = decrease_ratio(old - new, step.decrease, self.noise)
-        ended.steps.append(Iteration(outputs.value, step.decrease, ratio, trial.shift, self.radius))
+        if corrected is not None and corrected.merit < there.merit:
+            there = corrected
+        ratio, value = self._ratio(step, before, there), there.outputs.value
+        ended.steps.append(Iteration(value, step.decrease, ratio, trial.shift, self.radius))
         if self.report is not None:
-            self.report(len(ended.steps), outputs.value)
+            self.report(len(ended.steps), value)
         last, radius = self.radius, self.radius_after(step, ratio)
         self.shift = next_shift(trial.shift, trial.norm, radius)
         self.radius = radius
@@ -199,8 +208,8 @@ class _Iteration(BoundedSteps[X]):
             self._hold(step.reaction, -1.0)
             self.cautious = True
             return False
-        self.objective.accept(moved_step, model)
-        ended.x, ended.outputs, ended.z = x, outputs, moved
+        self.objective.accept(there.step, model)
+        ended.x, ended.outputs, ended.z = there.x, there.outputs, there.barrier
         if step.reaction is not None:  # by other multipliers costs cannot be compared
             ended.kept = None
         ended.keep_best(self.objective.bounds)
@@ -209,8 +218,44 @@ class _Iteration(BoundedSteps[X]):
         self._raise_mu(step)
         self.cautious = False
         self.product = ended.z.mean_product()
-        self._save(x)
+        self._save(there.x)
         return True
+
+    def _reached(
+        self, step: BoundedStep, along: Direction, moved: Array, model: QuadraticModel
+    ) -> _Reached[X]:
+        """Where a fraction of a direction leads. moved: its part in the unknowns."""
+        x = self.objective.retract(self.ended.x, moved, model)
+        outputs, barrier = self.objective.outputs(x), step.barrier
+        if not np.isfinite(outputs.value):
+            return _Reached(moved, x, outputs, barrier, math.inf)
+        barrier = barrier.moved(outputs.y, along, step.fraction, self.penalty)
+        merit = outputs.value + barrier.merit(outputs.y, self.penalty, along, 0.0)
+        if step.weight > 0.0:
+            merit += 0.5 * step.weight * size_of(self.objective.residual(x)) ** 2
+        return _Reached(moved, x, outputs, barrier, merit)
+
+    def _ratio(self, step: BoundedStep, before: float, there: _Reached[X]) -> float:
+        """The actual decrease of the merit function over the predicted one."""
+        return decrease_ratio(before - there.merit, step.decrease, self.noise)
+
+    def _corrected_step(
+        self, step: BoundedStep, there: _Reached[X], before: float, model: QuadraticModel
+    ) -> _Reached[X] | None:
+        """Where a step leads with its second-order correction, if equations curve too much.
+
+        None if they do not, or if the corrected step leaves the bounds.
+        """
+        poor = self._ratio(step, before, there) < CURVED and math.isfinite(there.merit)
+        if step.reaction is None or not poor or step.fraction == 0.0:
+            return None
+        residual = self.objective.residual(there.x)
+        more = model.correction(step.trial.factor, step.fraction, residual)
+        dy = step.along.dy + self.objective.push(more, model) / step.fraction
+        along = step.barrier.aim(self.ended.outputs.y, dy, step.targets)
+        if along.primal < 1.0 and step.barrier.boundary_fraction * along.primal < step.fraction:
+            return None
+        return self._reached(step, along, there.step + more, model)
 
     def _hold(self, reaction: Array | None, sign: float) -> float:
         """Change multipliers of equations by a step's, or take it back; returns what that adds."""

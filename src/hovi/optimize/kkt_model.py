@@ -379,11 +379,7 @@ class KktModel:
 
     def curvature(self, s: Array) -> float:
         """s.H s."""
-        columns = self.plain.gather(s)
-        N, size = len(columns), columns[0].size
-        hessian = self.plain.intervals.hessian.transpose(0, 1, 3, 2, 4).reshape(N, size, size)
-        product = np.matmul(hessian, columns.reshape(N, size, 1))
-        return float(np.vdot(columns, product))
+        return self.plain.curvature(s)
 
     def length(self, s: Array) -> float:
         """|s| in the metric."""

@@ -40,7 +40,12 @@ class IntervalSum:
 
 
 class QuadraticModel(ABC):
-    """The model in the coordinates of a solver; `np.vdot` pairs vectors and covectors."""
+    """The model in the coordinates of a solver; `np.vdot` pairs vectors and covectors.
+
+    equations: whether its steps satisfy equations c = 0 to first order.
+    """
+
+    equations: bool = False
 
     def __init__(self, intervals: IntervalSum) -> None:
         self.intervals = intervals
@@ -62,20 +67,35 @@ class QuadraticModel(ABC):
         """D s."""
         return self.scatter(np.matmul(self.intervals.metric, self.gather(s)))
 
-    def descend(self, factor: Factor) -> tuple[Array, float, float]:
-        """s = -(H + shift D)^-1 g, its slope g.s and its length squared s.D s."""
+    def descend(self, factor: Factor, radius: float = math.inf) -> tuple[Array, float, float]:
+        """s = -(H + shift D)^-1 g, its slope g.s and its length squared s.D s.
+
+        radius: within which a shift is to keep the step.
+        """
         s = factor.solve(-self.gradient)
         slope = float(np.vdot(self.gradient, s))
         return s, slope, float(np.vdot(s, self.metric_product(s)))
 
-    def reaction(
-        self, gradient: Array, s: Array, factor: Factor | None
-    ) -> tuple[Array, float] | None:
-        """Multipliers z of equations after a step s for a gradient, and z.c with the residual c.
+    def reaction(self, gradient: Array, s: Array, factor: Factor | None) -> tuple[Array, Array]:
+        """Change of the multipliers of equations with a step s, and A s.
 
-        None for a step, or a model, without equations.
+        gradient: for whose step the multipliers are sought.
         """
-        return None
+        raise NotImplementedError
+
+    def correction(self, factor: Factor | None, taken: float, residual: Array) -> Array:
+        """A step that takes away what the residual after a fraction of the last one is too large.
+
+        It is the second-order correction of that step. taken: the fraction.
+        """
+        raise NotImplementedError
+
+    def curvature(self, s: Array) -> float:
+        """s.H s."""
+        columns = self.gather(s)
+        N, size = len(columns), columns[0].size
+        hessian = self.intervals.hessian.transpose(0, 1, 3, 2, 4).reshape(N, size, size)
+        return float(np.vdot(columns, np.matmul(hessian, columns.reshape(N, size, 1))))
 
     def curvature_scale(self) -> float:
         """Magnitude of H relative to D, from which a first shift is chosen."""

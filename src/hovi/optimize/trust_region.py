@@ -263,7 +263,7 @@ class _ShiftSearch:
 
     def step_at(self, factor: Factor, shift: float) -> Trial:
         """The step for a shift."""
-        s, slope, norm2 = self.model.descend(factor)
+        s, slope, norm2 = self.model.descend(factor, self.radius)
         norm2 = max(norm2, 0.0)
         decrease = -0.5 * slope + 0.5 * shift * norm2
         if not math.isfinite(decrease) or (decrease == 0.0 and self.model.gradient.any()):
@@ -329,4 +329,5 @@ class _ShiftSearch:
         # Rayleigh quotient u.H u by one more inverse iteration
         rayleigh = 1.0 / float(np.vdot(Du, factor.solve(Du))) - trial.shift
         decrease = trial.decrease + trial.shift * b * length - 0.5 * length**2 * min(rayleigh, 0.0)
-        return Trial(step, decrease, trial.shift, self.radius, trial.norm < 1e-6 * self.radius)
+        alone = trial.norm < 1e-6 * self.radius
+        return Trial(step, decrease, trial.shift, self.radius, alone, factor)

@@ -51,7 +51,7 @@ class TorqueMoments:
         return cls([_moments(batch) for batch in ld.interval_batches], passive)
 
     def scaled(self, torques: Array, batch: int) -> Array:
-        """sqrt(h) m_j of the intervals of a batch, flat: their squares are those of `squares`."""
+        """sqrt(h) m_j of the intervals of a batch, flat."""
         moments = self.batches[batch]
         return np.asarray(moments.of(torques[:, self.passive]) * moments.root_steps).ravel()
 
@@ -81,27 +81,6 @@ class TorqueMoments:
         moments = self.batches[batch]
         projected = np.matmul(moments.tests.T, moments.of(torques[:, self.passive]))
         return np.asarray(projected.reshape(len(torques), -1))
-
-    def squares(self, torques: Array, batch: int) -> float:
-        """sum h_k m_j^2 over the intervals of a batch and the passive joints; torques as above."""
-        moments = self.batches[batch]
-        squares = np.sum(moments.of(torques[:, self.passive]) ** 2, axis=(1, 2))
-        return float(moments.batch.h @ squares)
-
-    def add_squares(self, expansion: Expansion, weight: float) -> None:
-        """Add weight h_k dm_j dm_j to the Hessian of every interval, in place.
-
-        With the force weight sum_j m_j P_j at the points it makes the expansion that of
-        weight/2 sum h_k m_j^2.
-        expansion: in nodal columns.
-        """
-        for i, (moments, (_, J)) in enumerate(zip(self.batches, expansion.outputs, strict=True)):
-            slopes = moments.slopes(J[:, self.passive], expansion.charts_of(i))
-            B, rows, m, n = slopes.shape
-            flat = slopes.reshape(B, rows, m * n)
-            scaled = flat.transpose(0, 2, 1) * (weight / moments.batch.h[:, None, None])
-            blocks = np.matmul(scaled, flat).reshape(B, m, n, m, n)
-            expansion.hessian[moments.batch.index, :m, :m] += blocks.transpose(0, 1, 3, 2, 4)
 
 
 def _moments(batch: IntervalBatch) -> IntervalMoments:

@@ -6,7 +6,6 @@ With equality constraints it is their augmented Lagrangian, see hovi.planning.so
 from __future__ import annotations
 
 import dataclasses
-import math
 from collections.abc import Callable
 from functools import cached_property, partial
 from typing import Literal
@@ -23,7 +22,7 @@ from hovi.discrete.interval_batch import Coordinates, Jet
 from hovi.discrete.interval_paths import move, move_any
 from hovi.errors import InputError
 from hovi.optimize.banded_model import BandModel
-from hovi.optimize.equation_model import EquationModel
+from hovi.optimize.equation_model import EquationModel, PenaltyModel
 from hovi.optimize.kkt_model import KktModel
 from hovi.optimize.merge_tree import MergeTreeModel
 from hovi.optimize.quadratic_model import IntervalSum, QuadraticModel
@@ -81,7 +80,7 @@ class ActionObjective(Objective[DiscretePath]):
         on = problem.coordinates
         integrate = partial(without_checks(type(on).integrate), on)
         self._integrate = np.add if on.vector_joints else integrate
-        self.ld = problem.ld if multipliers is None else _penalized(problem, multipliers)
+        self.ld = problem.ld
         self.structure = structure or problem.structure
         small = problem.grid.intervals <= MAX_BAND_INTERVALS
         mergeable = problem.plain and problem.ld.k == 2
@@ -113,7 +112,7 @@ class ActionObjective(Objective[DiscretePath]):
         return "nodal" if self.algebra == "band" else "regular"
 
     def value(self, x: DiscretePath) -> float:
-        """The discrete action, with the terms of multipliers and penalties."""
+        """The discrete action, with the terms of multipliers."""
         return self.value_of(x, self.outputs(x))
 
     def outputs(self, x: DiscretePath) -> list[Array]:
@@ -138,29 +137,16 @@ class ActionObjective(Objective[DiscretePath]):
             value += self.ld.lagrangians[i].integral(outputs[i], jet, t, weights)
             if self.multipliers is not None:
                 value += float(weights @ np.vecdot(self.multipliers.torque[i], outputs[i]))
-                if self.moments is not None:
-                    rho = self.multipliers.torque_penalty
-                    value += 0.5 * rho * self.moments.squares(outputs[i], i)
         if self.multipliers is not None:
-            rho = self.multipliers.penalty
             residuals = self.equations.conditions(x, self.jets(x))
             for mu, c in zip(self.multipliers.conditions, residuals, strict=True):
-                value += float(mu @ c + 0.5 * rho * c @ c)
+                value += float(mu @ c)
         return value
 
     def output_slope(self, outputs: Array, batch: int) -> Array:
         """d value / dy at the points of a batch: R y plus the multipliers."""
         slope = self.ld.lagrangians[batch].output_slope(outputs)
-        return slope if self.multipliers is None else slope + self._force(outputs, batch)
-
-    def _force(self, outputs: Array, batch: int) -> Array:
-        """The multipliers at the points of a batch, plus the penalty of moments."""
-        assert self.multipliers is not None
-        force = self.multipliers.torque[batch]
-        if self.moments is None:
-            return force
-        projected = self.moments.projected(outputs, batch)
-        return self.multipliers.plus_penalty(force, projected, self.problem.passive)
+        return slope if self.multipliers is None else slope + self.multipliers.torque[batch]
 
     def residuals(self, x: DiscretePath) -> Residuals:
         """Residuals of the equality constraints."""
@@ -184,7 +170,7 @@ class ActionObjective(Objective[DiscretePath]):
 
     @property
     def lagrangian(self) -> Lagrangian:
-        """The Lagrangian, with the penalties among its weights."""
+        """The Lagrangian."""
         return self.ld.lagrangian
 
     def jets(self, x: DiscretePath) -> list[Jet]:
@@ -208,11 +194,7 @@ class ActionObjective(Objective[DiscretePath]):
 
         step: in the columns of the intervals, shape (N, m, n).
         """
-        expansion = self.expansion
-        if self.moments is not None:
-            outputs = self.ld.predicted_outputs(expansion, step, self.coordinates)
-            return [self.output_slope(y, i) for i, y in enumerate(outputs)]
-        slopes = _predict(self.ld, expansion, step, self.coordinates)
+        slopes = _predict(self.ld, self.expansion, step, self.coordinates)
         if self.multipliers is None:
             return slopes
         return [slope + more for slope, more in zip(slopes, self.multipliers.torque, strict=True)]
@@ -230,20 +212,17 @@ class ActionObjective(Objective[DiscretePath]):
         add: adds further terms to the expansion.
         """
         multipliers = self.multipliers
-        jets, forces = self.jets(x), list[Array]()
+        jets = self.jets(x)
         if multipliers is not None:
-            terms = self._with_moments(x, multipliers).added_to(terms)
-            forces = multipliers.forces_of_conditions(self.equations.conditions(x, jets))
-            self.equations.add_forces(terms, forces, jets)
+            terms = multipliers.added_to(terms)
+            self.equations.add_forces(terms, multipliers.conditions, jets)
         self._expansion = _expand(
             self.ld, x, self.coordinates, curvatures, terms, jets, self.keep_points
         )
         if add is not None:
             add(self._expansion)
         if multipliers is not None:
-            self.equations.add_penalty(x, self._expansion, jets, forces, multipliers.penalty)
-            if self.moments is not None:
-                self.moments.add_squares(self._expansion, multipliers.torque_penalty)
+            self.equations.add_at_nodes(x, multipliers.conditions, self._expansion)
         return self.model_of_expansion()
 
     def model_of_expansion(self) -> QuadraticModel:
@@ -277,32 +256,32 @@ class ActionObjective(Objective[DiscretePath]):
         intervals = IntervalSum(expansion.gradient, expansion.hessian, metric)
         return MergeTreeModel(intervals, self.structure.tree)
 
-    def _with_moments(self, x: DiscretePath, multipliers: Multipliers) -> Multipliers:
-        """The multipliers, plus the force of the penalty of moments at x."""
-        if self.moments is None:
-            return multipliers
-        forces = [self._force(y, i) for i, y in enumerate(self.outputs(x))]
-        return dataclasses.replace(multipliers, torque=forces)
-
     def under_equations(self, x: DiscretePath, model: BandModel) -> EquationModel:
-        """The last model, at x, whose Newton steps satisfy the equations to first order."""
-        known, equations = self.multipliers, self.equations
-        assert known is not None
+        """The last model, at x, whose steps satisfy the equations to first order."""
+        return EquationModel(model, self._kkt(x, model), self.residual(x))
+
+    def with_penalty(self, x: DiscretePath, model: BandModel, weight: float) -> PenaltyModel:
+        """The last model, at x and the multipliers weight c, with weight |c|^2 / 2 added."""
+        return PenaltyModel(model, self._kkt(x, model), weight)
+
+    def _kkt(self, x: DiscretePath, model: BandModel) -> KktModel:
+        """The last model, at x, with the equations' rows."""
+        equations = self.equations
         rows = equations.rows(x, self.expansion, self.jets(x))
         layout, wide = equations.layout(rows)
         none, bands = np.zeros(len(layout.multipliers)), (self.structure.metric_band, wide)
-        kkt = KktModel(model.intervals, rows, none, layout, *bands)
-        penalty = known.torque_penalty if len(self.problem.passive) > 0 else known.penalty
-        residual = equations.residual(x, self.outputs(x), self.jets(x))
-        return EquationModel(model, kkt, residual, penalty, equations.stiffness)
+        return KktModel(model.intervals, rows, none, layout, *bands)
+
+    def residual(self, x: DiscretePath) -> Array:
+        """c of the equations at x, (E,); none without multipliers."""
+        if self.multipliers is None:
+            return np.zeros(0)
+        return self.equations.residual(x, self.outputs(x), self.jets(x))
 
     @cached_property
     def equations(self) -> Equations:
-        """The equations, with one penalty for all."""
-        known, scale = self.multipliers, 1.0
-        if known is not None and len(self.problem.passive) > 0:
-            scale = math.sqrt(known.penalty / known.torque_penalty)
-        return Equations(self.problem, scale)
+        """The equations, scaled as the multipliers are."""
+        return Equations(self.problem, 1.0 if self.multipliers is None else self.multipliers.scale)
 
     def hold(self, x: DiscretePath, change: Array) -> float:
         """Add a change to the multipliers of equations; returns what it adds to the value at x."""
@@ -314,7 +293,7 @@ class ActionObjective(Objective[DiscretePath]):
             force[:, passive] += more
         added = [mu + more for mu, more in zip(known.conditions, others, strict=True)]
         self.multipliers = dataclasses.replace(known, torque=forces, conditions=added)
-        return float(change @ self.equations.residual(x, self.outputs(x), self.jets(x)))
+        return float(change @ self.residual(x))
 
     def retract(self, x: DiscretePath, step: Array, model: QuadraticModel) -> DiscretePath:
         """The path moved by a step: nodes by `integrate`, everything else added."""
@@ -338,16 +317,3 @@ class ActionObjective(Objective[DiscretePath]):
         T = self.problem.grid.duration
         size = max(1.0, np.abs(x.q).max(), T * np.abs(x.v).max())
         return float(np.abs(changes).max() / size)
-
-
-def _penalized(problem: TrajectoryProblem, multipliers: Multipliers) -> DiscreteLagrangian:
-    """The discrete Lagrangian with the penalty as the weight of the passive joints' torques.
-
-    The penalty of moments couples the points of an interval, and cannot be a weight: see
-    `TorqueMoments.add_squares`.
-    """
-    if len(problem.passive) == 0 or problem.torque_moments is not None:
-        return problem.ld
-    weight = problem.ld.lagrangian.output_weight.copy()
-    weight[problem.passive] = multipliers.torque_penalty
-    return DiscreteLagrangian(problem.ld.lagrangian.reweighted(weight), problem.grid)

@@ -26,8 +26,8 @@ from hovi.planning.conditions.function import Points
 from hovi.planning.problem.limits import Limits, limited_columns
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.action_objective import ActionObjective, LinearAlgebra
-from hovi.planning.solver.augmented_lagrangian_rounds import within
 from hovi.planning.solver.limits.limit_rows import LimitRows, push_rows
+from hovi.planning.solver.missed_equations import within
 from hovi.planning.solver.multipliers import Multipliers
 from hovi.planning.solver.point_outputs import PointOutputs
 from hovi.scene.lagrangian import PointTerms, over_time
@@ -336,6 +336,10 @@ class BoundedAction(BoundedObjective[DiscretePath]):
     def hold(self, x: DiscretePath, change: Array) -> float:
         """See BoundedObjective.hold."""
         return self.action.hold(x, change)
+
+    def residual(self, x: DiscretePath) -> Array:
+        """c of equations at x, shape (E,); none where their multipliers are not known."""
+        return self.action.residual(x)
 
     def satisfies_equations(self, x: DiscretePath) -> bool:
         """Whether equations hold to their tolerances."""

@@ -17,18 +17,15 @@ from hovi.optimize.kkt_model import ConstraintRows, EqualityObjective, KktModel
 from hovi.optimize.quadratic_model import IntervalSum
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.action_objective import ActionObjective
-from hovi.planning.solver.augmented_lagrangian_rounds import (
-    CONDITION_TOLERANCE,
-    INITIAL_PENALTY,
-    TORQUE_TOLERANCE,
-    within,
-)
 from hovi.planning.solver.equations import Equations
+from hovi.planning.solver.missed_equations import CONDITION_TOLERANCE, TORQUE_TOLERANCE, within
 from hovi.planning.solver.multipliers import Multipliers
 from hovi.scene.lagrangian import PointTerms
 
 Array = npt.NDArray[np.float64]
 
+CONDITION_PENALTY = 1e3
+"""Penalty of conditions, relative to the cost, per [rad^2] or [m^2]."""
 PENALTY = 3e5
 """`penalty`, relative to the mean weight of the other joints' torques."""
 
@@ -40,25 +37,24 @@ class ConstrainedAction(EqualityObjective[DiscretePath]):
     """The discrete action in nodal coordinates, and the equations.
 
     problem: the trajectory problem. path: a guess, whose action scales the conditions.
-    torque_penalty, penalty: weights of |c|^2 for which torques and conditions count alike.
+    penalty: weight of |c|^2, with which torques and conditions count alike.
     """
 
     def __init__(self, problem: TrajectoryProblem, path: DiscretePath) -> None:
         self.problem = problem
         self.action = ActionObjective(problem, "band")
-        self.torque_penalty = PENALTY * problem.mean_output_weight
-        self.penalty = self._first_penalty(path)
-        self.scale = float(np.sqrt(self.penalty / self.torque_penalty))
+        self.penalty = PENALTY * problem.mean_output_weight
+        self.scale = float(np.sqrt(self._condition_penalty(path) / self.penalty))
         self.equations = Equations(problem, self.scale)
 
-    def _first_penalty(self, path: DiscretePath) -> float:
+    def _condition_penalty(self, path: DiscretePath) -> float:
         """The penalty of conditions, from the cost of a path or the curvature there."""
         if not (self.problem.equations or self.problem.along):
-            return self.torque_penalty
+            return self.penalty
         cost = abs(self.problem.ld.action(path))
         expansion = _expand(self.problem.ld, path, "nodal", None, None, self.action.jets(path))
         largest = float(np.max(np.abs(expansion.hessian)))
-        return max(INITIAL_PENALTY * cost, largest, 1e-6)
+        return max(CONDITION_PENALTY * cost, largest, 1e-6)
 
     @cached_property
     def negligible(self) -> float:
@@ -107,7 +103,7 @@ class ConstrainedAction(EqualityObjective[DiscretePath]):
     def multipliers(self, y: Array) -> Multipliers:
         """The multipliers of the equations as lambda at points, and those of conditions."""
         torque, others = self.equations.split(y)
-        zero = Multipliers.zero(self.equations, self.torque_penalty, self.penalty)
+        zero = Multipliers.zero(self.equations)
         for force, passive in zip(zero.torque, torque, strict=False):  # none without passive joints
             force[:, self.problem.passive] = passive
         return dataclasses.replace(zero, conditions=others)
@@ -118,10 +114,6 @@ class ConstrainedAction(EqualityObjective[DiscretePath]):
         terms = known.forces
         self.equations.add_forces(terms, known.conditions, self.action.jets(x))
         return terms
-
-    def of_conditions(self, known: Multipliers) -> Array:
-        """The multipliers y with those of conditions alone."""
-        return np.concatenate([mu / self.scale for mu in known.conditions])
 
 
 def _take_out(rows: list[ConstraintRows], multipliers: Array, expansion: Expansion) -> None:

@@ -24,9 +24,6 @@ from hovi.scene.lagrangian import PointTerms
 
 Array = npt.NDArray[np.float64]
 
-MOMENT_STIFFNESS = 100.0
-"""Stiffness of moments of equations along the motion: see EquationModel."""
-
 
 class Equations:
     """The equations of a problem as rows of its intervals.
@@ -48,16 +45,6 @@ class Equations:
     def sizes(self) -> list[int]:
         """The sizes of `conditions`."""
         return [*(each.size for each in self.along), *(each.size for each in self.at_nodes)]
-
-    @property
-    def stiffness(self) -> Array:
-        """By how much less than a node each equation gives way, (E,): moments to high modes."""
-        known = self.moments
-        batches = 0 if known is None else len(known.batches)
-        torques = 0 if known is None else sum(known.size(i) for i in range(batches))
-        along = sum(each.size for each in self.along)
-        at_nodes = sum(each.size for each in self.at_nodes)
-        return np.repeat([1.0, MOMENT_STIFFNESS, 1.0], [torques, along, at_nodes])
 
     def residual(self, x: DiscretePath, outputs: list[Array], jets: Sequence[Jet]) -> Array:
         """c at a path, with the Lagrangian's outputs and (q, v, a) at its points."""
@@ -124,28 +111,15 @@ class Equations:
             for i, gradient, curvature in each.terms(jets, multipliers):
                 terms[i] = terms[i].plus(gradient, curvature)
 
-    def add_penalty(
-        self,
-        x: DiscretePath,
-        expansion: Expansion,
-        jets: Sequence[Jet],
-        forces: list[Array],
-        penalty: float,
-    ) -> None:
-        """Add conditions c with the terms mu c + penalty c^2 / 2 to an expansion, in place.
+    def add_at_nodes(self, x: DiscretePath, mu: list[Array], expansion: Expansion) -> None:
+        """Add the terms mu c of conditions at nodes to an expansion, in place.
 
-        forces: mu + penalty c. Those of `add_forces` are in the expansion already.
+        mu: multipliers of `conditions`.
         """
-        known = self.condition_rows(x, expansion, jets)
-        for each in itertools.chain(*known):
-            B, _, m, n = each.slopes.shape
-            product = np.matmul(each.flat.transpose(0, 2, 1), penalty * each.flat)
-            blocks = product.reshape(B, m, n, m, n).transpose(0, 1, 3, 2, 4)
-            expansion.hessian[each.index, :m, :m] += blocks
-        at_nodes = known[len(self.along) :], forces[len(self.along) :]
-        for (each,), force in zip(*at_nodes, strict=True):
-            expansion.gradient[each.index, : each.slopes.shape[2]] += each.weighted(force)
-        self.add_curvature(x, forces, expansion.hessian)
+        for each, multipliers in zip(self.at_nodes, mu[len(self.along) :], strict=True):
+            rows = each.rows(x)
+            expansion.gradient[rows.index, : rows.slopes.shape[2]] += rows.weighted(multipliers)
+        self.add_curvature(x, mu, expansion.hessian)
 
     def in_intervals(self, rows: list[ConstraintRows]) -> list[ConstraintRows]:
         """Of `rows`, those whose forces act at the points: all but those at nodes."""

@@ -1,13 +1,8 @@
-"""Multipliers and penalties of the equality constraints: an augmented Lagrangian.
+"""Multipliers of the equality constraints, and what these miss.
 
 For the constraints tau = 0 of passive joints at the quadrature points, with weights w, and the
-conditions c = 0, the action is replaced by
-
-    action + sum w (lambda tau + rho tau^2/2) + sum (mu c + rho c^2/2).
-
-It keeps the block structure. For rho large enough constrained minima are minima of it, and its
-negative eigenvalues are those of the Hessian on the tangent space of the constraints.
-[NocedalWright2006, section 17.3]
+conditions c = 0, the Lagrangian is action + sum w lambda tau + sum mu c, which keeps the block
+structure.
 """
 
 from __future__ import annotations
@@ -51,48 +46,29 @@ class Residuals:
 
 @dataclass(frozen=True, eq=False)
 class Multipliers:
-    """The multipliers lambda and mu, and their penalties.
+    """The multipliers lambda and mu.
 
     torque: lambda of every joint at the quadrature points, (P, nv) per batch, zero where a joint
         is not passive. conditions: mu, see `Equations.conditions`.
-    torque_penalty, penalty: rho of torques and of conditions. jet_size: numbers (k+1) nv of the jet
-        at a point.
+    scale: of conditions beside torques, see `Equations`. jet_size: numbers (k+1) nv of the jet at
+        a point.
     """
 
     torque: list[Array]
     conditions: list[Array]
-    torque_penalty: float
-    penalty: float
+    scale: float
     jet_size: int
 
     @classmethod
-    def zero(cls, equations: Equations, torque_penalty: float, penalty: float) -> Multipliers:
-        """Zero multipliers of a problem's equations, with given penalties."""
+    def zero(cls, equations: Equations) -> Multipliers:
+        """Zero multipliers of a problem's equations."""
         problem = equations.problem
         lagrangian = problem.ld.lagrangian
         outputs = len(lagrangian.output_weight)
         torque = [np.zeros((len(t), outputs)) for t in problem.ld.point_times]
         conditions = [np.zeros(size) for size in equations.sizes]
         jet_size = (lagrangian.order + 1) * lagrangian.nv
-        return cls(torque, conditions, torque_penalty, penalty, jet_size)
-
-    def updated(self, residuals: Residuals, passive: npt.NDArray[np.intp]) -> Multipliers:
-        """lambda + rho c, the first-order estimate of the multipliers."""
-        torques = zip(self.torque, residuals.torque, strict=True)
-        torque = [self.plus_penalty(force, tau, passive) for force, tau in torques]
-        return dataclasses.replace(
-            self, torque=torque, conditions=self.forces_of_conditions(residuals.conditions)
-        )
-
-    def forces_of_conditions(self, c: list[Array]) -> list[Array]:
-        """mu + rho c of the conditions."""
-        return [mu + self.penalty * each for mu, each in zip(self.conditions, c, strict=True)]
-
-    def plus_penalty(self, force: Array, tau: Array, passive: npt.NDArray[np.intp]) -> Array:
-        """A force at points (P, nv) plus rho tau of the passive joints (P, passive)."""
-        force = force.copy()
-        force[:, passive] += self.torque_penalty * tau
-        return force
+        return cls(torque, conditions, equations.scale, jet_size)
 
     @property
     def forces(self) -> list[PointTerms]:
@@ -107,11 +83,3 @@ class Multipliers:
             dataclasses.replace(term, output_gradient=term.output_gradient + force)
             for term, force in zip(terms, self.torque, strict=True)
         ]
-
-    def with_scaled_penalties(self, torque: float, conditions: float) -> Multipliers:
-        """The same multipliers with penalties scaled by the given factors."""
-        return dataclasses.replace(
-            self,
-            torque_penalty=self.torque_penalty * torque,
-            penalty=self.penalty * conditions,
-        )

@@ -1,7 +1,7 @@
 """The action with quadratic penalties instead of limits, to restore feasibility, or to refute it.
 
-A motion at which the violation has a minimum that is not zero is locally infeasible: none near it
-violates the limits less. [NocedalWright2006, section 17.2]
+A motion at which the violation of limits and equations has a minimum that is not zero is locally
+infeasible: none near it violates them less. [NocedalWright2006, section 17.2]
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.discrete.grid import DiscretePath
+from hovi.optimize.banded_model import BandModel
 from hovi.optimize.criteria import Criteria
 from hovi.optimize.ended import Ended, Outputs, Reason
 from hovi.optimize.quadratic_model import QuadraticModel
@@ -32,7 +33,10 @@ OUTWEIGHED = 0.5
 
 
 class PenalizedAction(Objective[DiscretePath]):
-    """action + penalty/2 sum weights (distance outside the bounds)^2."""
+    """action + penalty/2 (sum weights (distance outside the bounds)^2 + |c|^2).
+
+    limited: with multipliers of the equations c that are zero, or without equations.
+    """
 
     def __init__(self, limited: BoundedAction, penalty: float) -> None:
         self.limited = limited
@@ -45,29 +49,43 @@ class PenalizedAction(Objective[DiscretePath]):
 
     def value(self, x: DiscretePath) -> float:
         """The penalized action."""
-        return self._outputs(x).value + 0.5 * self.penalty * self.squares(x)
+        return self.action(x) + 0.5 * self.penalty * self.squares(x)
 
     def squares(self, x: DiscretePath) -> float:
-        """Sum weights (distance outside the bounds)^2."""
-        return float(np.sum(self.limited.bounds.weights * self._outside(x) ** 2))
+        """Sum weights (distance outside the bounds)^2, plus |c|^2."""
+        c, outside = self.limited.residual(x), self._outside(x)
+        return float(np.sum(self.limited.bounds.weights * outside**2)) + float(c @ c)
 
     def action(self, x: DiscretePath) -> float:
         """The action alone."""
         return self._outputs(x).value
 
+    @property
+    def negligible(self) -> float:
+        """See Objective.negligible."""
+        return self.limited.action.negligible
+
     def is_least(self, ended: Ended[DiscretePath, None]) -> bool:
         """Whether a violation is near a minimum, which is not zero."""
-        action = ended.value - 0.5 * self.penalty * self.squares(ended.x)
         slow = ended.why in (Reason.STALLED, Reason.STATIONARY)
-        return slow and action <= OUTWEIGHED * ended.value
+        return slow and self.action(ended.x) <= OUTWEIGHED * ended.value
 
     def model(
         self, x: DiscretePath, previous: QuadraticModel | None, step: Array | None
     ) -> QuadraticModel:
         """The quadratic model, with the bounds that are violated at x."""
-        outside = self._outside(x)
-        force = self.penalty * outside
-        return self.limited.model(x, self.penalty * (outside != 0), force, force)
+        outside, action = self._outside(x), self.limited.action
+        force, none = self.penalty * outside, action.multipliers
+        if none is not None:
+            action.hold(x, self.penalty * action.residual(x))
+        if previous is not None and step is not None:
+            self.limited.accept(step, previous)
+        model = self.limited.model(x, self.penalty * (outside != 0), force, force)
+        action.multipliers = none
+        if none is None:
+            return model
+        assert isinstance(model, BandModel)
+        return action.with_penalty(x, model, self.penalty)
 
     def retract(self, x: DiscretePath, step: Array, model: QuadraticModel) -> DiscretePath:
         """The path moved by a step."""

@@ -144,6 +144,10 @@ class TimedBoundedAction(BoundedObjective[TimedPath]):
         self.first.action.multipliers = action.multipliers
         return added
 
+    def residual(self, x: TimedPath) -> Array:
+        """See BoundedObjective.residual."""
+        return self.at(x.lengths).residual(x.path)
+
     def satisfies_equations(self, x: TimedPath) -> bool:
         """Whether equations hold to their tolerances."""
         return self.at(x.lengths).satisfies_equations(x.path)

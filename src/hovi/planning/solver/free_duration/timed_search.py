@@ -23,7 +23,6 @@ from hovi.planning.problem.limits import Limits
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.problem.time_price import TimePrice
 from hovi.planning.solver.answer import Answer, answered
-from hovi.planning.solver.augmented_lagrangian_rounds import spurious_sentence
 from hovi.planning.solver.free_duration.timed_bounded_action import TimedBoundedAction
 from hovi.planning.solver.free_duration.timed_path import TimedPath, stretched_path
 from hovi.planning.solver.methods.bounded_search import (
@@ -37,6 +36,7 @@ from hovi.planning.solver.methods.feasibility import solved_from
 from hovi.planning.solver.methods.interior_point import takes_rows
 from hovi.planning.solver.methods.limits_between_points import tightened, usable
 from hovi.planning.solver.methods.method import Guess
+from hovi.planning.solver.missed_equations import spurious_sentence
 from hovi.planning.solver.near.cleared_action import ClearedAction
 from hovi.planning.solver.outcome.cost_with_time import cost_of
 from hovi.planning.solver.status import Status, saddle_in_words, unfinished

@@ -15,8 +15,8 @@ from hovi.optimize.barrier import Barrier
 from hovi.optimize.ended import STOPPED, Ended, Outputs, Reason
 from hovi.optimize.start import Start
 from hovi.optimize.trust_region import minimize
-from hovi.planning.solver.augmented_lagrangian_rounds import first_multipliers
 from hovi.planning.solver.bounded_action import BoundedAction
+from hovi.planning.solver.first_multipliers import first_multipliers
 from hovi.planning.solver.methods.bounded_search import Bounded, BoundedSearch
 from hovi.planning.solver.multipliers import Multipliers
 from hovi.planning.solver.penalized_action import (
@@ -44,17 +44,19 @@ SMALL_VIOLATION = 1e-3
 
 
 def locally_infeasible(search: BoundedSearch, ended: Bounded) -> str:
-    """Why no motion is within limits, if their violation has minima that are not zero; else "".
+    """Why no motion satisfies limits and equations, if their violation has minima; else "".
 
     These are looked for from the motion of a failed solve, from the guess and from a perturbed one.
     If all three find one, and two of them the lowest, that becomes the motion of the failed solve.
     """
-    if search.problem.constrained or search.clearance is not None or search.free_duration:
+    problem = search.problem
+    if search.clearance is not None or search.free_duration:
         return ""
     rows, search.rows = search.rows, search.fine_rows()
-    objective = search.objective(None)
-    density = ended.outputs.density(objective.bounds.measure)
-    penalized = PenalizedAction(objective, LEAST_VIOLATION_PENALTY * density)
+    penalty = LEAST_VIOLATION_PENALTY * ended.outputs.density(problem.grid.duration)
+    known = first_multipliers(problem, ended.x) if problem.constrained else None
+    objective = search.objective(known)
+    penalized = PenalizedAction(objective, penalty)
     found: list[Ended[DiscretePath, None]] = []
     for path in (ended.x, search.guess, _bumped_guess(search, 0, BUMP_FRACTION)):
         each = least_violation(penalized, path, search.remaining_criteria())
@@ -62,7 +64,8 @@ def locally_infeasible(search: BoundedSearch, ended: Bounded) -> str:
         found.append(each)
         if each.why in STOPPED:
             ended.why = each.why
-        if not penalized.is_least(each) or penalized.violation(each.x) <= SMALL_VIOLATION:
+        kept = penalized.violation(each.x) <= SMALL_VIOLATION
+        if not penalized.is_least(each) or (kept and not search.unsatisfied(each.x)):
             break
     else:
         most = SAME_VIOLATION * min(penalized.squares(each.x) for each in found)
@@ -71,7 +74,7 @@ def locally_infeasible(search: BoundedSearch, ended: Bounded) -> str:
             ended.x = min(same, key=penalized.action)
             ended.outputs = objective.outputs(ended.x)
             ended.z = Barrier.inactive(objective.bounds, ended.outputs.y)
-            return search.worst(ended.x)
+            return search.unsatisfied(ended.x) or search.worst(ended.x)
     search.rows = rows
     return ""
 
@@ -98,7 +101,8 @@ def restored_motion(search: BoundedSearch, ended: Bounded) -> tuple[Bounded, str
         if violation < least:
             least, ended.x = violation, path
     ended.outputs, ended.z = _without_forces(search, known, ended.x)
-    return ended, search.worst(ended.x)
+    # within limits, equations alone may be out of reach of this solve only
+    return ended, search.worst(ended.x) if least > SMALL_VIOLATION else ""
 
 
 def _without_forces(

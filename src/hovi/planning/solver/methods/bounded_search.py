@@ -11,7 +11,7 @@ import numpy.typing as npt
 from hovi.discrete.grid import DiscretePath
 from hovi.discrete.instants import Instants
 from hovi.optimize.banded_model import BandModel
-from hovi.optimize.barrier import INITIAL_MARGIN, WARM_START_MARGIN, Barrier
+from hovi.optimize.barrier import INITIAL_MARGIN, Barrier
 from hovi.optimize.criteria import Criteria
 from hovi.optimize.ended import Ended, Iteration, Reason
 from hovi.optimize.equation_model import EquationModel
@@ -31,21 +31,20 @@ from hovi.planning.problem.limit_conditions import LimitRange, limit_conditions
 from hovi.planning.problem.limits import Limits
 from hovi.planning.problem.presolve.end_torques import static_sentence
 from hovi.planning.problem.problem import TrajectoryProblem
-from hovi.planning.solver.action_objective import LinearAlgebra
-from hovi.planning.solver.augmented_lagrangian_rounds import (
-    CONDITION_TOLERANCE,
-    TORQUE_TOLERANCE,
-    first_multipliers,
-    minimize_constrained,
-    unmet_sentence,
-)
+from hovi.planning.solver.action_objective import ActionObjective, LinearAlgebra
 from hovi.planning.solver.bounded_action import BoundedAction
 from hovi.planning.solver.central_path import CentralPath
 from hovi.planning.solver.clearance_outputs import EXTRA_CLEARANCE, ClearanceOutputs
 from hovi.planning.solver.condition_outputs import ConditionOutputs
+from hovi.planning.solver.first_multipliers import first_multipliers
 from hovi.planning.solver.limits.limit_rows import LimitRows
 from hovi.planning.solver.limits.row_forces import by_segment, forces_of, joined
 from hovi.planning.solver.methods.method import Guess, Report
+from hovi.planning.solver.missed_equations import (
+    CONDITION_TOLERANCE,
+    TORQUE_TOLERANCE,
+    unmet_sentence,
+)
 from hovi.planning.solver.multipliers import Multipliers
 from hovi.planning.solver.near.clearance_rows import ClearanceRows
 from hovi.planning.solver.near.cleared_action import ClearedAction
@@ -58,8 +57,6 @@ Array = npt.NDArray[np.float64]
 Bounded = Ended[DiscretePath, Barrier]
 Begun = Start[DiscretePath, Barrier]
 
-ROUND_BARRIER = 3e-7
-"""Least last barrier parameter in rounds of an augmented Lagrangian, relative to the density."""
 FIRST_HALVINGS = 0, 1
 """Number of halvings of intervals for limits on positions, and on their derivatives."""
 FINE_HALVINGS = 2, 3
@@ -236,30 +233,16 @@ class BoundedSearch:
         return dataclasses.replace(self.criteria, time_limit=self.deadline.seconds_left)
 
     def solve(self, start: Begun) -> Bounded:
-        """Solve with bounds at the quadrature points; in rounds for passive torques."""
-        if not self.problem.constrained:
-            return self.minimized(self.objective(None), start, self.remaining_criteria())
-        if len(self.problem.passive) == 0:
-            return self._solved_under_equations(start)
-        z = start.z
-
-        def minimize_round(known: Multipliers, x: DiscretePath, decrease: float) -> Bounded:
-            nonlocal z
-            objective, criteria = self.objective(known), self.remaining_criteria()
-            decrease, mu = max(decrease, criteria.decrease), max(ROUND_BARRIER, criteria.barrier)
-            criteria = dataclasses.replace(criteria, decrease=decrease, barrier=mu)
-            ended = self.minimized(objective, Start(x, z), criteria)
-            fraction = float(np.clip(decrease**0.5, ROUND_BARRIER, WARM_MU_RANGE[1]))
-            mu = fraction * ended.outputs.density(objective.bounds.measure)
-            y, barrier = ended.outputs.y, ended.z
-            z = None
-            if len(y) == len(barrier.s) == len(objective.bounds.lower):
-                margin = min(fraction, WARM_START_MARGIN)
-                z = Barrier.central(objective.bounds, y, mu, None, margin, barrier)
+        """Solve with bounds at the quadrature points; steps satisfy equations to first order."""
+        known = self.known_multipliers(start.x)
+        objective = self.objective(known, tolerances=EXACT_TOLERANCES)
+        ended = self.minimized(objective, start, self.remaining_criteria())
+        if known is None:
             return ended
-
-        rounds = minimize_constrained(self.problem, start.x, minimize_round, self.multipliers)
-        ended, self.multipliers, self.unmet = rounds
+        self.multipliers = objective.action.multipliers
+        self.unmet = ""
+        if ended.why is Reason.STATIONARY:
+            self.unmet = self.unsatisfied(ended.x)
         return ended
 
     def solve_at_level(self, path: DiscretePath, level: float) -> Bounded:
@@ -289,16 +272,11 @@ class BoundedSearch:
         z = Barrier.central(objective.bounds, outputs.y, level * density, scale, margin)
         return Start(path, z)
 
-    def _solved_under_equations(self, start: Begun) -> Bounded:
-        """A solve whose steps satisfy conditions."""
-        known = self.known_multipliers(start.x)
-        objective = self.objective(known, tolerances=EXACT_TOLERANCES)
-        ended = self.minimized(objective, start, self.remaining_criteria())
-        self.multipliers = objective.action.multipliers
-        self.unmet = ""
-        if ended.why is Reason.STATIONARY:
-            self.unmet = unmet_sentence(self.problem, ended.x, objective.action.residuals(ended.x))
-        return ended
+    def unsatisfied(self, path: DiscretePath) -> str:
+        """Which equations a motion does not satisfy, a sentence without its end; "" for none."""
+        if not self.problem.constrained:
+            return ""
+        return unmet_sentence(self.problem, path, ActionObjective(self.problem).residuals(path))
 
     def known_multipliers(self, path: DiscretePath) -> Multipliers | None:
         """Known multipliers of the constraints, or first ones at a path; None without any."""
@@ -346,8 +324,6 @@ class BoundedSearch:
         """Those of limits at the quadrature points and of constraints."""
         known = self.multipliers
         if known is not None:
-            action = self.objective(known).action
-            known = known.updated(action.residuals(ended.x), self.problem.passive)
             return self.objective(known).forces(ended.x, ended.z.multipliers)
         return self._objective_of(ended).forces(ended.x, ended.z.multipliers)
 

@@ -9,11 +9,7 @@ import numpy as np
 from hovi.discrete.grid import DiscretePath
 from hovi.optimize.ended import STOPPED, Reason
 from hovi.optimize.start import Start
-from hovi.planning.solver.action_objective import ActionObjective
-from hovi.planning.solver.augmented_lagrangian_rounds import (
-    first_multipliers,
-    minimize_constrained,
-)
+from hovi.planning.solver.first_multipliers import first_multipliers
 from hovi.planning.solver.limits.limit_rows import LimitRows
 from hovi.planning.solver.methods.bounded_search import (
     ROUGH_TOLERANCES,
@@ -36,8 +32,6 @@ ROUGH_STEPS = 100
 """Maximum number of its steps."""
 ROUGH_VIOLATION = 0.05
 """Largest violation of a bound, relative to its range, from which a rough motion is solved on."""
-ROUGH_ROUNDS = 3
-"""Rounds of an augmented Lagrangian for a rough motion."""
 DETOUR = 1.05
 """Cost of a rough motion, relative to that of one without distances, above which it is one."""
 
@@ -72,22 +66,10 @@ def _without_distances(search: BoundedSearch, guess: DiscretePath) -> Bounded:
         return search.solve(Start(guess))
 
     search.near = None
-    rough = _rough_with_constraints(search, guess)
+    rough, _ = _rough(search, guess, first_multipliers(search.problem, guess), None)
     search.near = near
     near.extend(search.problem, rough.x, AHEAD)
     return rough if near.blocked or rough.why in STOPPED else search.solve(Start(rough.x))
-
-
-def _rough_with_constraints(search: BoundedSearch, guess: DiscretePath) -> Bounded:
-    """A rough motion that nearly satisfies the constraints."""
-    problem = search.problem
-
-    def minimize_round(known: Multipliers, x: DiscretePath, _: float) -> Bounded:
-        return _rough(search, x, known, None if x is guess else FIRST_MU)[0]
-
-    if len(problem.passive) == 0:
-        return _rough(search, guess, first_multipliers(problem, guess), None)[0]
-    return minimize_constrained(problem, guess, minimize_round, most=ROUGH_ROUNDS)[0]
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,9 +112,6 @@ def _rough_with_distances(search: BoundedSearch, path: DiscretePath) -> _Rough |
     ended, known = _rough(search, moved, known, FIRST_MU)
     if ended.why is Reason.DIVERGED or ended.violation > ROUGH_VIOLATION:
         return None
-    if known is not None and len(problem.passive) > 0:
-        residuals = ActionObjective(problem, multipliers=known).residuals(ended.x)
-        known = known.updated(residuals, problem.passive)
     return _Rough(ended, known, search.rows, search.near)
 
 
@@ -150,7 +129,6 @@ def _rough(
     criteria = dataclasses.replace(
         criteria, max_iterations=min(ROUGH_STEPS, criteria.max_iterations)
     )
-    tolerances = ROUGH_TOLERANCES if len(search.problem.passive) == 0 else None
-    objective = search.objective(known, tolerances=tolerances)
+    objective = search.objective(known, tolerances=ROUGH_TOLERANCES)
     start = Start(path) if mu is None else search.start_at(path, mu, objective)
     return search.minimized(objective, start, criteria), objective.action.multipliers

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 
 import numpy as np
 
@@ -10,10 +11,10 @@ from hovi.discrete.grid import DiscretePath
 from hovi.optimize.barrier import Barrier
 from hovi.optimize.ended import STOPPED, Reason
 from hovi.optimize.start import Start
-from hovi.planning.solver.augmented_lagrangian_rounds import first_multipliers
 from hovi.planning.solver.central_path import CentralPath
+from hovi.planning.solver.first_multipliers import first_multipliers
 from hovi.planning.solver.limits.restored_motion import locally_infeasible, restored_motion
-from hovi.planning.solver.methods.bounded_search import Bounded, BoundedSearch
+from hovi.planning.solver.methods.bounded_search import EXACT_TOLERANCES, Bounded, BoundedSearch
 from hovi.planning.solver.methods.cleared_motion import cleared_motion
 
 NEARBY_MU = 1e-2
@@ -42,19 +43,18 @@ def feasible_motion(search: BoundedSearch) -> tuple[Bounded, str]:
     if search.near is not None:
         failed = ended.why is Reason.DIVERGED and not ended.feasible
         return ended, search.worst(ended.x) if failed else ""
-    if ended.why is Reason.DIVERGED and not ended.feasible:
-        reason = locally_infeasible(search, ended)
-        if reason or ended.why in STOPPED:
-            return ended, reason
-    if ended.feasible or ended.why is not Reason.DIVERGED:
+    satisfied = ended.feasible and not search.unsatisfied(ended.x)
+    if satisfied or ended.why is not Reason.DIVERGED:
         return ended, ""
+    reason = locally_infeasible(search, ended)
+    if reason or ended.why in STOPPED:
+        return ended, reason
     return restored_motion(search, ended)
 
 
 def _solved_nearby(search: BoundedSearch) -> Bounded | None:
     """The solution near a guess that is taken to be near one; None if it is not, or that fails."""
-    constrained = search.problem.constrained and search.near is None
-    if not search.start.near or search.clearance is not None or constrained:
+    if not search.start.near or search.clearance is not None:
         return None
     whole = search.criteria
     most, along = whole.max_iterations, search.along
@@ -81,9 +81,8 @@ def _solved_along(search: BoundedSearch, along: CentralPath) -> Bounded:
         ended = _followed(search, along)
         if ended is not None:
             return ended
-        objective, moved = search.objective(search.multipliers), search.problem.moved(along.last)
-        change = objective.outputs(moved).y - objective.outputs(along.last).y
-        shift = float(np.max(np.abs(change), initial=0.0))
+        moved = search.problem.moved(along.last)
+        shift = _shift(search, along.last, moved)
         level = float(np.clip(SHIFT_LEVEL * shift, *SHIFT_LEVELS))
         if along.barrier is not None and shift <= WARM_SHIFT:
             ended = _solved_warm(search, along.barrier, moved)
@@ -91,6 +90,24 @@ def _solved_along(search: BoundedSearch, along: CentralPath) -> Bounded:
                 return ended
             _adopt(search, along)
     return _solved_from_level(search, along, level)
+
+
+def _shift(search: BoundedSearch, path: DiscretePath, moved: DiscretePath) -> float:
+    """How far outputs move to the ends and equations of the problem, relative to their ranges.
+
+    By the first-order step to the equations. path: the known motion. moved: between other ends.
+    """
+    objective = search.objective(search.known_multipliers(moved), tolerances=EXACT_TOLERANCES)
+    y = objective.outputs(moved).y
+    change = y - objective.outputs(path).y
+    residual = objective.residual(moved)
+    if len(residual) > 0:
+        model = objective.model(moved, *Barrier.inactive(objective.bounds, y).condensed(y))
+        factor = model.factor(0.0)
+        if factor is None:
+            return math.inf
+        change += objective.push(model.correction(factor, 1.0, residual), model)
+    return float(np.max(np.abs(change), initial=0.0))
 
 
 def _adopt(search: BoundedSearch, along: CentralPath) -> None:

@@ -13,12 +13,12 @@ from hovi.planning.problem.contradictions import contradiction
 from hovi.planning.problem.limits import no_limits
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.answer import Answer, answered
-from hovi.planning.solver.augmented_lagrangian_rounds import missed_sentence
 from hovi.planning.solver.methods.active_pairs import with_active_pairs
 from hovi.planning.solver.methods.bounded_search import BoundedSearch
 from hovi.planning.solver.methods.feasibility import feasible_motion
 from hovi.planning.solver.methods.limits_between_points import tightened, usable
 from hovi.planning.solver.methods.method import Guess, Method, Report
+from hovi.planning.solver.missed_equations import missed_sentence
 from hovi.planning.solver.non_finite import non_finite_condition, non_finite_sentence
 from hovi.planning.solver.outcome.cost_with_time import cost_of
 from hovi.planning.solver.status import (
@@ -102,6 +102,7 @@ def _searched(search: BoundedSearch) -> Answer:
         status, message = Status.INFEASIBLE, infeasible_sentence(reason)
     elif ended.why is not Reason.STATIONARY:
         status, message = _unfinished(ended.why, nit, value)
+        message += missed_sentence(problem, x) if problem.constrained else ""
     elif n_neg == 0:
         status, message = Status.MINIMUM, _minimum(search, value, excess)
     else:

@@ -14,26 +14,31 @@ from hovi.optimize.ended import Ended, Reason
 from hovi.optimize.lagrange_newton import minimize_under_equations
 from hovi.optimize.start import Start
 from hovi.optimize.trust_region import minimize
+from hovi.planning.problem.limits import no_limits
 from hovi.planning.problem.problem import TrajectoryProblem
-from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.answer import Answer
-from hovi.planning.solver.augmented_lagrangian_rounds import (
+from hovi.planning.solver.bounded_action import BoundedAction
+from hovi.planning.solver.constrained_action import ConstrainedAction
+from hovi.planning.solver.methods.method import Guess, Method, Report
+from hovi.planning.solver.missed_equations import (
     FEASIBLE_RESIDUAL,
-    FIRST_DECREASE,
-    WARM_TORQUE_FRACTION,
-    first_multipliers,
     missed_sentence,
     spurious_sentence,
     unmet_sentence,
     within,
 )
-from hovi.planning.solver.constrained_action import ConstrainedAction
-from hovi.planning.solver.methods.method import Guess, Method, Report
+from hovi.planning.solver.multipliers import Multipliers
 from hovi.planning.solver.outcome.cost_with_time import price_of_time
+from hovi.planning.solver.penalized_action import PenalizedAction
 from hovi.planning.solver.status import Status, status_of
 from hovi.system.deadline import Deadline, OutOfTimeError
 
 Array = npt.NDArray[np.float64]
+
+WARM_TORQUE_FRACTION = 0.1
+"""Passive torque of a guess, relative to the largest torque, up to which multipliers are known."""
+FIRST_DECREASE = 1e-3
+"""Relative decrease at which a minimisation with a penalty stops."""
 
 
 class LagrangeNewton(Method):
@@ -124,13 +129,12 @@ def _with_penalty(
     objective: ConstrainedAction, start: Guess, criteria: Criteria, report: Report | None
 ) -> tuple[Ended[DiscretePath, None], Array]:
     """A motion near a minimum, where equations at nodes hold nearly, and its multipliers."""
-    problem = objective.problem
-    known = dataclasses.replace(first_multipliers(problem, start.x), penalty=objective.penalty)
-    penalized = ActionObjective(problem, multipliers=known)
+    problem, none = objective.problem, Multipliers.zero(objective.equations)
+    free = BoundedAction(problem, no_limits(problem.coordinates), multipliers=none)
+    penalized = PenalizedAction(free, objective.penalty)
     rough = dataclasses.replace(criteria, decrease=FIRST_DECREASE)
     ended = minimize(penalized, Start(start.x), rough, report)
-    updated = known.updated(penalized.residuals(ended.x), problem.passive)
-    return ended, objective.of_conditions(updated)
+    return ended, objective.penalty * free.residual(ended.x)
 
 
 def _with_offset(report: Report | None, done: int) -> Report | None:
