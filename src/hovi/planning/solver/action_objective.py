@@ -184,17 +184,20 @@ class ActionObjective(Objective[DiscretePath]):
     ) -> QuadraticModel:
         """The quadratic model at x, its curvature weighted by the predicted outputs."""
         if previous is not None and step is not None and self._expansion is not None:
-            curvatures = self.predicted_slopes(previous.gather(step))
+            curvatures = self.plus_multipliers(self.predicted_slopes(previous.gather(step)))
         else:
             curvatures = [self.output_slope(y, i) for i, y in enumerate(self.outputs(x))]
         return self.model_with(x, curvatures, None)
 
     def predicted_slopes(self, step: Array) -> list[Array]:
-        """`output_slope` of the outputs that a step of the last model predicts, per batch.
+        """R y of the outputs that a step of the last model predicts, per batch.
 
         step: in the columns of the intervals, shape (N, m, n).
         """
-        slopes = _predict(self.ld, self.expansion, step, self.coordinates)
+        return _predict(self.ld, self.expansion, step, self.coordinates)
+
+    def plus_multipliers(self, slopes: list[Array]) -> list[Array]:
+        """Slopes R y at the points, per batch, plus the multipliers of torques."""
         if self.multipliers is None:
             return slopes
         return [slope + more for slope, more in zip(slopes, self.multipliers.torque, strict=True)]

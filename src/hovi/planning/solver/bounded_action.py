@@ -6,6 +6,7 @@ import copy
 import dataclasses
 import itertools
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import cached_property
 from typing import Self
 
@@ -49,12 +50,14 @@ class BoundedAction(BoundedObjective[DiscretePath]):
     algebra, multipliers: as for ActionObjective.
     more: further outputs.
     rows: control points, bounded instead of values at the points and refined in place; or None.
+    penalty: of |c|^2 / 2 of equations in the value, instead of steps that satisfy them.
     tolerances: where steps satisfy equations and their multipliers follow, those of passive
         torques, relative to the largest torque, and of conditions, in the unit of y; None where the
         multipliers stay.
     """
 
     tolerances: tuple[float, float] | None = None
+    penalty: float = 0.0
 
     def __init__(
         self,
@@ -106,7 +109,11 @@ class BoundedAction(BoundedObjective[DiscretePath]):
     def outputs(self, x: DiscretePath) -> Outputs:
         """The discrete action, and the bounded outputs relative to their ranges."""
         outputs = self.action.outputs(x)
-        return Outputs(self.action.value_of(x, outputs), self._bounded_outputs(x, outputs))
+        value = self.action.value_of(x, outputs)
+        if self.penalty > 0.0:
+            c = self.residual(x)
+            value += 0.5 * self.penalty * float(c @ c)
+        return Outputs(value, self._bounded_outputs(x, outputs))
 
     def _bounded_outputs(self, x: DiscretePath, outputs: list[Array]) -> Array:
         """Those at the points, then those of the rows, (R,), from the Lagrangian's outputs."""
@@ -133,6 +140,26 @@ class BoundedAction(BoundedObjective[DiscretePath]):
         self, x: DiscretePath, sigma: Array, rho: Array, multipliers: Array
     ) -> QuadraticModel:
         """The model of the action with the terms of the bounds: see BoundedObjective.model."""
+        if self.penalty == 0.0:
+            return self._model(x, sigma, rho, multipliers)
+        with self._held(x):
+            model = self._model(x, sigma, rho, multipliers)
+        assert isinstance(model, BandModel)
+        return self.action.with_penalty(x, model, self.penalty)
+
+    @contextmanager
+    def _held(self, x: DiscretePath) -> Iterator[None]:
+        """With the forces of the penalty as multipliers."""
+        none = self.action.multipliers
+        self.action.hold(x, self.penalty * self.residual(x))
+        try:
+            yield
+        finally:
+            self.action.multipliers = none
+
+    def _model(
+        self, x: DiscretePath, sigma: Array, rho: Array, multipliers: Array
+    ) -> QuadraticModel:
         points = (self._of_points(part) for part in (sigma, rho, multipliers))
         sigma_at, rho_at, multipliers_at = points
         gradient = self._unscaled(rho_at, 1)
@@ -441,7 +468,9 @@ class BoundedAction(BoundedObjective[DiscretePath]):
     def _slope(self, x: DiscretePath, batch: int) -> Array:
         """R y as predicted, or at x before the first step."""
         if self._predicted is not None:
-            return self._predicted[batch]
+            known = self.action.multipliers
+            slope = self._predicted[batch]
+            return slope if known is None else slope + known.torque[batch]
         jet, t = self.action.jets(x)[batch], self.ld.point_times[batch]
         outputs = self.ld.lagrangians[batch].output(*jet, t=t)
         return self.action.output_slope(outputs, batch)

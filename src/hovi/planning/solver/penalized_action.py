@@ -12,7 +12,6 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.discrete.grid import DiscretePath
-from hovi.optimize.banded_model import BandModel
 from hovi.optimize.criteria import Criteria
 from hovi.optimize.ended import Ended, Outputs, Reason
 from hovi.optimize.quadratic_model import QuadraticModel
@@ -35,11 +34,13 @@ OUTWEIGHED = 0.5
 class PenalizedAction(Objective[DiscretePath]):
     """action + penalty/2 (sum weights (distance outside the bounds)^2 + |c|^2).
 
-    limited: with multipliers of the equations c that are zero, or without equations.
+    limited: with the same penalty of its equations c, and multipliers that are zero.
     """
 
     def __init__(self, limited: BoundedAction, penalty: float) -> None:
         self.limited = limited
+        if limited.action.multipliers is not None:
+            limited.penalty = penalty
         self.penalty = penalty
         self._last: tuple[DiscretePath, Outputs] | None = None
 
@@ -49,16 +50,16 @@ class PenalizedAction(Objective[DiscretePath]):
 
     def value(self, x: DiscretePath) -> float:
         """The penalized action."""
-        return self.action(x) + 0.5 * self.penalty * self.squares(x)
+        return self._outputs(x).value + 0.5 * self.penalty * self._outside_squares(x)
 
     def squares(self, x: DiscretePath) -> float:
         """Sum weights (distance outside the bounds)^2, plus |c|^2."""
-        c, outside = self.limited.residual(x), self._outside(x)
-        return float(np.sum(self.limited.bounds.weights * outside**2)) + float(c @ c)
+        c = self.limited.residual(x)
+        return self._outside_squares(x) + float(c @ c)
 
     def action(self, x: DiscretePath) -> float:
         """The action alone."""
-        return self._outputs(x).value
+        return self.value(x) - 0.5 * self.penalty * self.squares(x)
 
     @property
     def negligible(self) -> float:
@@ -74,18 +75,11 @@ class PenalizedAction(Objective[DiscretePath]):
         self, x: DiscretePath, previous: QuadraticModel | None, step: Array | None
     ) -> QuadraticModel:
         """The quadratic model, with the bounds that are violated at x."""
-        outside, action = self._outside(x), self.limited.action
-        force, none = self.penalty * outside, action.multipliers
-        if none is not None:
-            action.hold(x, self.penalty * action.residual(x))
         if previous is not None and step is not None:
             self.limited.accept(step, previous)
-        model = self.limited.model(x, self.penalty * (outside != 0), force, force)
-        action.multipliers = none
-        if none is None:
-            return model
-        assert isinstance(model, BandModel)
-        return action.with_penalty(x, model, self.penalty)
+        outside = self._outside(x)
+        force = self.penalty * outside
+        return self.limited.model(x, self.penalty * (outside != 0), force, force)
 
     def retract(self, x: DiscretePath, step: Array, model: QuadraticModel) -> DiscretePath:
         """The path moved by a step."""
@@ -99,6 +93,10 @@ class PenalizedAction(Objective[DiscretePath]):
         if self._last is None or self._last[0] is not x:
             self._last = x, self.limited.outputs(x)
         return self._last[1]
+
+    def _outside_squares(self, x: DiscretePath) -> float:
+        """Sum weights (distance outside the bounds)^2."""
+        return float(np.sum(self.limited.bounds.weights * self._outside(x) ** 2))
 
     def _outside(self, x: DiscretePath) -> Array:
         y, bounds = self._outputs(x).y, self.limited.bounds
