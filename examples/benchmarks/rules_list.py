@@ -397,6 +397,52 @@ _rule(
     "min(max(FRACTION_TO_BOUNDARY, 1.0 - self.mu / self.scale), LARGEST_FRACTION)",
     "FRACTION_TO_BOUNDARY",
 )
+_at("equations", "optimize.interior_point")
+_rule(
+    "corrections for curved equations",
+    "Within limits a step whose merit falls by less than half of what it predicts is corrected.",
+    "_Iteration._corrected_step",
+    "self._ratio(step, before, there) < CURVED",
+    "False",
+)
+_at("equations", "optimize.bounded_steps")
+_rule(
+    "weight of the residual",
+    "A step under equations that predicts no decrease gets one by a weight of |c|^2.",
+    "BoundedSteps._shortened",
+    "self._weight(predicted, self._residual_decrease(longest, As))",
+    "0.0",
+)
+_rule(
+    "multipliers without the barrier",
+    "Multipliers of a shortened step are those for the forces of the bounds as they are.",
+    "BoundedSteps._reaction",
+    "self.objective.pull(self.force - self.rho, model)",
+    "0.0",
+)
+_at("equations", "optimize.equation_model")
+_rule(
+    "least-squares multipliers of shortened steps",
+    "A step that is kept within a radius has the multipliers of one that keeps c.",
+    "EquationModel.reaction",
+    "factor.shift == 0.0",
+    "True",
+)
+_rule(
+    "a part of the radius for the equations",
+    "What takes c away has at most 0.8 of the radius.",
+    "EquationModel.descend",
+    "factor.shift > 0.0",
+    "False",
+)
+_at("warm starts", "planning.solver.methods.feasibility")
+_rule(
+    "level of equations",
+    "The level of a near start is also that of the step that satisfies its equations.",
+    "_shift",
+    "len(residual) > 0",
+    "False",
+)
 _at("equations", "optimize.lagrange_newton")
 _rule(
     "second-order corrections",

@@ -403,3 +403,46 @@ def test_a_grid_is_refined_for_it_alone(line: dict[str, Any]) -> None:
     assert all(each.success for each in found), [each.message for each in found]
     assert found[0].margins().missed["x"] > 1e-6
     assert found[1].margins().missed["x"] < 1e-6
+
+
+def test_a_plane_of_a_redundant_arm_does_not_make_steps_creep() -> None:
+    """Within limits steps follow a condition that curves; a stiff penalty took hundreds of them."""
+    robot = hovi.load_robot("kinova")
+    names, frame = list(robot.model.names)[1:], "j2s6s200_end_effector"
+    start = dict.fromkeys(names, 0.0) | {names[1]: 2.5, names[2]: 2.0, names[4]: 1.0}
+    scene = hovi.Scene(robot, [hovi.effects.Gravity()])
+    settings: dict[str, Any] = {"self_collision": False, "limits": "urdf"}
+    goal = start | {names[0]: 2.8}
+    short = hovi.plan(scene, start, goal, 8.0, intervals=2, **settings)
+    height = float(tool_at(robot, frame, short.trajectory.q[0])[2])
+    plane = kept(frame, "z", np.array([0.0, 0.0, height]))
+    found = hovi.plan(scene, start, goal, 8.0, conditions=plane, **settings)
+    assert found.success, found.message
+    assert found.nit < 200
+    at = found.trajectory.sample(np.linspace(0.0, 8.0, 1001))
+    assert max(abs(tool_at(robot, frame, q)[2] - height) for q in at.q) < 1e-6
+
+
+def test_a_via_point_off_the_line_is_infeasible_within_limits(line: dict[str, Any]) -> None:
+    """Near the middle of the motion, where neither end tells."""
+    off = hovi.Via(0.8, hovi.FrameGoal("tool0", position=line["point"] + [0.05, 0.15, 0.05]))
+    ends = line["scene"], line["q0"], line["q1"], 1.5
+    asked: dict[str, Any] = {"limits": "urdf", "self_collision": False, "time_limit": 60.0}
+    found = hovi.plan(*ends, conditions=line["line"], via=[off], **asked)
+    assert found.status is hovi.Status.INFEASIBLE
+    assert "goal at t = 0.8 s" in found.message or "condition" in found.message
+
+
+def test_the_same_value_many_times_changes_nothing_within_limits(line: dict[str, Any]) -> None:
+    x = float(line["point"][0])
+    many = [
+        hovi.Condition(f'{k} * (position["tool0", "x"] - {x!r})', hovi.Equal(0.0), name=f"x{k}")
+        for k in range(1, 7)
+    ]
+    ends = line["scene"], line["q0"], line["q1"], 1.5
+    one, all_of_them = (
+        hovi.plan(*ends, conditions=asked, limits="urdf", self_collision=False)
+        for asked in (many[:1], many)
+    )
+    assert all_of_them.success, all_of_them.message
+    assert all_of_them.cost == pytest.approx(one.cost, rel=1e-3)

@@ -45,3 +45,19 @@ def test_a_swing_up_keeps_its_limits_without_torque_at_the_passive_joint(
             low, high = bounds.T if bounds.ndim == 2 else (-bounds, bounds)
             room = 2e-6 * (high - low)
             assert np.all((values > low - room) & (values < high + room))
+
+
+@pytest.mark.parametrize("limits", [{"q": [[-0.6, 0.6], [-7.0, 7.0]]}, {"v": 12.0}])
+def test_limits_that_hardly_bind_take_hardly_more_steps(limits: dict[str, Any]) -> None:
+    """The equations of the passive joint are satisfied by the steps themselves."""
+    file, passive, start, goal = POLE
+    scene = hovi.Scene(
+        hovi.load_robot(hovi.example(file)), [hovi.effects.Gravity()], passive=[passive]
+    )
+    asked: dict[str, Any] = {"limits": {"base": "none", **limits}, "starts": 1}
+    free = hovi.plan(scene, start, goal, 1.5, limits="none", starts=1)
+    held = hovi.plan(scene, start, goal, 1.5, **asked)
+    assert free.success, free.message
+    assert held.success, held.message
+    assert held.cost == pytest.approx(free.cost, rel=1e-4)
+    assert held.nit <= 2 * free.nit
