@@ -83,6 +83,9 @@ class BoundedObjective(ABC, Generic[X]):
         """Add a change to the multipliers of equations; returns what it adds to the value at x."""
         return 0.0
 
+    def let_go(self) -> None:
+        """Take the last change of `hold` back, exactly."""
+
     def residual(self, x: X) -> Array:
         """c of equations at x, shape (E,)."""
         return np.zeros(0)

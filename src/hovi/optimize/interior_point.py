@@ -184,12 +184,14 @@ class _Iteration(BoundedSteps[X]):
 
     def _try(self, step: BoundedStep, model: QuadraticModel) -> bool:
         ended, trial = self.ended, step.trial
-        before = ended.outputs.value + step.before + self._hold(step.reaction, 1.0)
+        before = ended.outputs.value + step.before
+        if step.reaction is not None:
+            before += self.objective.hold(ended.x, step.reaction)
         try:
             there = self._reached(step, step.along, step.fraction * trial.step, model)
             corrected = self._corrected_step(step, there, before, model)
         except BaseException:  # the multipliers stay those of the current point
-            self._hold(step.reaction, -1.0)
+            self._let_go(step)
             raise
         if corrected is not None and corrected.merit < there.merit:
             there = corrected
@@ -205,7 +207,7 @@ class _Iteration(BoundedSteps[X]):
         if refused:
             if not self.cautious:  # the same again, as a plain step
                 self.radius = last
-            self._hold(step.reaction, -1.0)
+            self._let_go(step)
             self.cautious = True
             return False
         self.objective.accept(there.step, model)
@@ -257,11 +259,10 @@ class _Iteration(BoundedSteps[X]):
             return None
         return self._reached(step, along, there.step + more, model)
 
-    def _hold(self, reaction: Array | None, sign: float) -> float:
-        """Change multipliers of equations by a step's, or take it back; returns what that adds."""
-        if reaction is None:
-            return 0.0
-        return self.objective.hold(self.ended.x, sign * reaction)
+    def _let_go(self, step: BoundedStep) -> None:
+        """Take the change of the multipliers of equations back that goes with a step."""
+        if step.reaction is not None:
+            self.objective.let_go()
 
     def _save(self, x: X) -> None:
         """Save an iterate: the last one before the product halves."""

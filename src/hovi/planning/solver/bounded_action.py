@@ -93,6 +93,7 @@ class BoundedAction(BoundedObjective[DiscretePath]):
         self._predicted: list[Array] | None = None
         self._jacobian = np.zeros((0, 0, 0))
         self._torque_weights: Array | None = None
+        self._before_hold = multipliers
 
     def _with_rows(self) -> None:
         """The bounds of the outputs at the points, then those of the rows."""
@@ -362,7 +363,12 @@ class BoundedAction(BoundedObjective[DiscretePath]):
 
     def hold(self, x: DiscretePath, change: Array) -> float:
         """See BoundedObjective.hold."""
+        self._before_hold = self.action.multipliers
         return self.action.hold(x, change)
+
+    def let_go(self) -> None:
+        """See BoundedObjective.let_go."""
+        self.action.multipliers = self._before_hold
 
     def residual(self, x: DiscretePath) -> Array:
         """c of equations at x, shape (E,); none where their multipliers are not known."""

@@ -45,6 +45,7 @@ class TimedBoundedAction(BoundedObjective[TimedPath]):
         self._update()
         self._terms: tuple[Array, Array, Array] | None = None
         self._last = first  # that of the last model
+        self._before_hold = first.action.multipliers
         self._rates = np.zeros(0)  # d outputs / d log L of their parts, (R,)
 
     def _update(self) -> None:
@@ -140,9 +141,14 @@ class TimedBoundedAction(BoundedObjective[TimedPath]):
     def hold(self, x: TimedPath, change: Array) -> float:
         """See BoundedObjective.hold."""
         action = self.action(x.lengths)
+        self._before_hold = action.multipliers
         added = action.hold(x.path, change)
         self.first.action.multipliers = action.multipliers
         return added
+
+    def let_go(self) -> None:
+        """See BoundedObjective.let_go."""
+        self.first.action.multipliers = self._before_hold
 
     def residual(self, x: TimedPath) -> Array:
         """See BoundedObjective.residual."""
