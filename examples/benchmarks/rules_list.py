@@ -475,13 +475,6 @@ _rule(
 )
 _at("equations", "planning.solver.methods.lagrange_newton")
 _rule(
-    "Lagrange-Newton",
-    "Equations without limits by Newton's method on the KKT equations, not by the interior point.",
-    "LagrangeNewton.supports",
-    "problem.constrained and not problem.limited",
-    "False",
-)
-_rule(
     "one round before Lagrange-Newton",
     "With equations at nodes alone a rough minimisation with a penalty comes first.",
     "_minimized",

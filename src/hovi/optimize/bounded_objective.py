@@ -79,9 +79,8 @@ class BoundedObjective(ABC, Generic[X]):
     def retract(self, x: X, step: Array, model: QuadraticModel) -> X:
         """The point that a step of a model leads to."""
 
-    def hold(self, x: X, change: Array) -> float:
-        """Add a change to the multipliers of equations; returns what it adds to the value at x."""
-        return 0.0
+    def hold(self, change: Array) -> None:
+        """Add a change to the multipliers of equations, shape (E,)."""
 
     def let_go(self) -> None:
         """Take the last change of `hold` back, exactly."""

@@ -31,6 +31,8 @@ MAX_STRETCH = 1.5
 LARGER_DENSITY, LEAST_DENSITY = 3.0, 1e-5
 """Mean density of the objective, relative to the present one, up to which the first one is the unit
 of the last barrier parameter, and the least unit, relative to the first one."""
+WEIGHED = 0.3
+"""What a step under equations predicts, relative to the decrease of |c|^2 with its weight."""
 LONG_STEP = 0.95
 """Fractions of a direction above which it needs no correction."""
 SHORTER_FRACTIONS = 0.8, 0.6, 0.4, 0.2, 0.1, 0.03, 0.01, 1e-3
@@ -49,10 +51,6 @@ CUT_RADIUS = 10.0
 """The largest radius after such a step, relative to what was left of it."""
 LEAST_CUT_RADIUS = 1e-3
 """The least radius after such a step."""
-WEIGHED = 0.3
-"""What a step predicts at least, relative to the decrease of |c|^2 with its weight."""
-NONE = np.zeros(0)
-"""The residual where there are no equations."""
 SHORTENED = 0.3
 """Ratio of the radius after such a step while outputs are not matched; its square, where the step
 was refused."""
@@ -119,7 +117,7 @@ class BoundedSteps(Generic[X]):
         sigma, rho, force = ended.z.condensed(ended.outputs.y)
         self.sigma, self.rho, self.force, self.exact = sigma, rho, force, True
         model = self.objective.model(ended.x, sigma, rho, force)
-        self.residual = self.objective.residual(ended.x) if model.equations else NONE
+        self.residual = self.objective.residual(ended.x)
         known = self.exact_from_now_on or not self.objective.may_be_concave
         if known or model.factor(0.0) is not None:
             return model
@@ -209,7 +207,7 @@ class BoundedSteps(Generic[X]):
         inside = along.primal >= 1.0  # a slack at the end of a whole step is kept off its bound
         longest = 1.0 if inside else barrier.boundary_fraction * along.primal
         fraction, predicted = longest, decrease(longest)
-        if predicted < -10 * self.noise and change is not None:
+        if predicted < -10 * self.noise and self._misses_equations(model):
             weight = self._weight(predicted, self._residual_decrease(longest, As))
             predicted = decrease(longest)
         for shorter in SHORTER_FRACTIONS:
@@ -234,19 +232,26 @@ class BoundedSteps(Generic[X]):
         as they are: rho of a slack at its bound is a stiff penalty, which no multiplier balances.
         """
         if not model.equations:
-            return None, self.residual
+            return None, np.zeros_like(self.residual)
         if not trial.newton:
             gradient = gradient + self.objective.pull(self.force - self.rho, model)
         return model.reaction(gradient, s, trial.factor)
 
+    def _misses_equations(self, model: QuadraticModel) -> bool:
+        """Whether there are equations that do not hold to their tolerances."""
+        return model.equations and not self.objective.satisfies_equations(self.ended.x)
+
     def _residual_decrease(self, fraction: float, As: Array) -> float:
-        """The decrease of |c|^2 / 2 that a fraction of a step predicts."""
+        """The predicted decrease of |c|^2 / 2, to |c + fraction A s|^2 / 2.
+
+        As: shape (E,).
+        """
         return -fraction * float((self.residual + 0.5 * fraction * As) @ As)
 
     def _weight(self, predicted: float, gain: float) -> float:
-        """The weight of |c|^2 / 2 with which a step predicts a decrease.
+        """The weight w of |c|^2 / 2 with which a step predicts WEIGHED w gain.
 
-        predicted: without. gain: decrease of |c|^2 / 2.
+        predicted: without it, predicted + w gain with it. gain: decrease of |c|^2 / 2.
         """
         return -predicted / ((1.0 - WEIGHED) * gain) if gain > 0.0 else 0.0
 

@@ -6,7 +6,8 @@ With the change z of their multipliers,
 
 Where a shift keeps the step within a radius, what takes c away has at most a part of that radius,
 and only a fraction of c is taken away [NocedalWright2006, section 18.5]. The multipliers that go
-with such a step are those of least squares: those of the step itself grow with the shift.
+with such a step are those of a step with A s = 0, for large shifts those of least squares in the
+metric: those of the step itself grow with the shift.
 """
 
 from __future__ import annotations

@@ -186,7 +186,8 @@ class _Iteration(BoundedSteps[X]):
         ended, trial = self.ended, step.trial
         before = ended.outputs.value + step.before
         if step.reaction is not None:
-            before += self.objective.hold(ended.x, step.reaction)
+            self.objective.hold(step.reaction)
+            before += float(step.reaction @ self.residual)
         try:
             there = self._reached(step, step.along, step.fraction * trial.step, model)
             corrected = self._corrected_step(step, there, before, model)

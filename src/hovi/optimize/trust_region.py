@@ -41,6 +41,8 @@ SIZE_TEST_LENGTH = 1e-4
 """Step length, relative to the first radius, up to which the relative size is evaluated."""
 LAST_DECREASE = 1e-14
 """Relative predicted decrease below which an exact Newton step is the last in any case."""
+LEAST_SHIFT = 1e-9
+"""Shift, relative to the curvature, with which a short step is taken for a longer Newton step."""
 SINGULAR = 1e-13
 """Negative curvature, relative to the largest, that is one of rounding errors."""
 STALLED_STEPS = 5
@@ -252,6 +254,7 @@ class _ShiftSearch:
         self.model, self.radius = model, radius
         self.low, self.high = 0.0, math.inf
         self.indefinite, self.reached = False, guess > 0.0
+        self.newton_too_long = False
 
     def after_failure(self, shift: float) -> float:
         """The next shift where H + shift D is not positive definite."""
@@ -276,13 +279,15 @@ class _ShiftSearch:
         slope = float(np.vdot(Ds, factor.solve(Ds)))  # s.D (H + shift D)^-1 D s
         if trial.norm > self.radius:
             self.low = max(self.low, shift)
+            self.newton_too_long |= trial.newton
         else:
             self.high = min(self.high, shift)
         norm, radius = trial.norm, self.radius
         newton = shift + (norm**2 / slope * (norm - radius) / radius if slope > 0 else 0.0)
         if self.low < newton < self.high:
             return newton
-        if trial.norm < self.radius and not self.indefinite and self.low == 0.0:
+        free = not (self.indefinite or self.newton_too_long)
+        if trial.norm < self.radius and free and self.low == 0.0:
             return 0.0
         if not math.isfinite(self.high):
             return max(10 * shift, 1e-6 * self._scale())
@@ -297,7 +302,9 @@ class _ShiftSearch:
     def fits(self, trial: Trial) -> bool:
         """Whether a step is within a quarter of the radius, or a shorter Newton step."""
         within = trial.norm <= 1.25 * self.radius
-        return within and (trial.newton or trial.norm >= 0.75 * self.radius)
+        # under equations steps for small shifts may stay short where the Newton step is long
+        least = self.newton_too_long and trial.shift <= LEAST_SHIFT * self._scale()
+        return within and (trial.newton or least or trial.norm >= 0.75 * self.radius)
 
     def is_short(self, trial: Trial) -> bool:
         """Whether a step ends inside the radius although H is indefinite."""

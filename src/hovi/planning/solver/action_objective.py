@@ -1,6 +1,6 @@
 """The discrete action of a trajectory problem as an objective of the trust-region method.
 
-With equality constraints it is their augmented Lagrangian, see hovi.planning.solver.multipliers.
+With equality constraints it is their Lagrangian, see hovi.planning.solver.multipliers.
 """
 
 from __future__ import annotations
@@ -286,8 +286,8 @@ class ActionObjective(Objective[DiscretePath]):
         """The equations, scaled as the multipliers are."""
         return Equations(self.problem, 1.0 if self.multipliers is None else self.multipliers.scale)
 
-    def hold(self, x: DiscretePath, change: Array) -> float:
-        """Add a change to the multipliers of equations; returns what it adds to the value at x."""
+    def hold(self, change: Array) -> None:
+        """Add a change to the multipliers of equations, shape (E,)."""
         known = self.multipliers
         assert known is not None
         passive, (torque, others) = self.problem.passive, self.equations.split(change)
@@ -296,7 +296,6 @@ class ActionObjective(Objective[DiscretePath]):
             force[:, passive] += more
         added = [mu + more for mu, more in zip(known.conditions, others, strict=True)]
         self.multipliers = dataclasses.replace(known, torque=forces, conditions=added)
-        return float(change @ self.residual(x))
 
     def retract(self, x: DiscretePath, step: Array, model: QuadraticModel) -> DiscretePath:
         """The path moved by a step: nodes by `integrate`, everything else added."""

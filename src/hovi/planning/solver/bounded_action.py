@@ -152,7 +152,7 @@ class BoundedAction(BoundedObjective[DiscretePath]):
     def _held(self, x: DiscretePath) -> Iterator[None]:
         """With the forces of the penalty as multipliers."""
         none = self.action.multipliers
-        self.action.hold(x, self.penalty * self.residual(x))
+        self.action.hold(self.penalty * self.residual(x))
         try:
             yield
         finally:
@@ -361,10 +361,10 @@ class BoundedAction(BoundedObjective[DiscretePath]):
         """Take `output_slope` of predicted outputs, per batch; those of the path if empty."""
         self._predicted = slopes or None
 
-    def hold(self, x: DiscretePath, change: Array) -> float:
+    def hold(self, change: Array) -> None:
         """See BoundedObjective.hold."""
         self._before_hold = self.action.multipliers
-        return self.action.hold(x, change)
+        self.action.hold(change)
 
     def let_go(self) -> None:
         """See BoundedObjective.let_go."""

@@ -18,14 +18,13 @@ from hovi.optimize.quadratic_model import IntervalSum
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.equations import Equations
+from hovi.planning.solver.first_multipliers import CONDITION_PENALTY
 from hovi.planning.solver.missed_equations import CONDITION_TOLERANCE, TORQUE_TOLERANCE, within
 from hovi.planning.solver.multipliers import Multipliers
 from hovi.scene.lagrangian import PointTerms
 
 Array = npt.NDArray[np.float64]
 
-CONDITION_PENALTY = 1e3
-"""Penalty of conditions, relative to the cost, per [rad^2] or [m^2]."""
 PENALTY = 3e5
 """`penalty`, relative to the mean weight of the other joints' torques."""
 

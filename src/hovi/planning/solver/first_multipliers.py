@@ -9,15 +9,26 @@ from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.equations import Equations
 from hovi.planning.solver.multipliers import Multipliers
 
-CONDITION_SCALE = 10.0
-"""What a condition that is missed by 1 rad or 1 m counts beside a passive torque, relative to the
-torque whose effort is the cost."""
+TORQUE_PENALTY = 10.0
+"""Penalty of passive torques, relative to the mean weight of the other joints."""
+CONDITION_PENALTY = 1e3
+"""Penalty of conditions, relative to the cost, per [rad^2] or [m^2]."""
 
 
 def first_multipliers(problem: TrajectoryProblem, path: DiscretePath) -> Multipliers:
-    """Zero multipliers, with a scale of conditions beside torques from the cost of a path."""
-    scale = 1.0
-    if len(problem.passive) > 0 and (problem.equations or problem.along):
-        cost = max(abs(problem.ld.action(path)), 1e-6)
-        scale = CONDITION_SCALE * math.sqrt(cost / problem.mean_output_weight)
+    """Zero multipliers; conditions are scaled such that one penalty suits them and torques."""
+    scale, penalty = 1.0, first_penalty(problem, path)
+    if len(problem.passive) > 0:
+        scale = math.sqrt(CONDITION_PENALTY * _cost(problem, path) / penalty)
     return Multipliers.zero(Equations(problem, scale))
+
+
+def first_penalty(problem: TrajectoryProblem, path: DiscretePath) -> float:
+    """The penalty of |c|^2 / 2 with which a rough motion may miss equations by a little."""
+    if len(problem.passive) > 0:
+        return TORQUE_PENALTY * problem.mean_output_weight
+    return CONDITION_PENALTY * _cost(problem, path)
+
+
+def _cost(problem: TrajectoryProblem, path: DiscretePath) -> float:
+    return max(abs(problem.ld.action(path)), 1e-6)

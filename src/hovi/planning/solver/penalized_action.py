@@ -1,4 +1,4 @@
-"""The action with quadratic penalties instead of limits, to restore feasibility, or to refute it.
+"""The action with penalties for limits and equations, to restore feasibility, or to refute it.
 
 A motion at which the violation of limits and equations has a minimum that is not zero is locally
 infeasible: none near it violates them less. [NocedalWright2006, section 17.2]
@@ -75,7 +75,9 @@ class PenalizedAction(Objective[DiscretePath]):
         self, x: DiscretePath, previous: QuadraticModel | None, step: Array | None
     ) -> QuadraticModel:
         """The quadratic model, with the bounds that are violated at x."""
-        if previous is not None and step is not None:
+        if previous is None or step is None:
+            self.limited.predict([])
+        else:
             self.limited.accept(step, previous)
         outside = self._outside(x)
         force = self.penalty * outside

@@ -45,7 +45,6 @@ class TimedBoundedAction(BoundedObjective[TimedPath]):
         self._update()
         self._terms: tuple[Array, Array, Array] | None = None
         self._last = first  # that of the last model
-        self._before_hold = first.action.multipliers
         self._rates = np.zeros(0)  # d outputs / d log L of their parts, (R,)
 
     def _update(self) -> None:
@@ -138,17 +137,13 @@ class TimedBoundedAction(BoundedObjective[TimedPath]):
         assert isinstance(model, TimedModel)
         self._slopes = model.predicted_slopes(step)
 
-    def hold(self, x: TimedPath, change: Array) -> float:
-        """See BoundedObjective.hold."""
-        action = self.action(x.lengths)
-        self._before_hold = action.multipliers
-        added = action.hold(x.path, change)
-        self.first.action.multipliers = action.multipliers
-        return added
+    def hold(self, change: Array) -> None:
+        """See BoundedObjective.hold; other lengths take the multipliers over."""
+        self.first.hold(change)
 
     def let_go(self) -> None:
         """See BoundedObjective.let_go."""
-        self.first.action.multipliers = self._before_hold
+        self.first.let_go()
 
     def residual(self, x: TimedPath) -> Array:
         """See BoundedObjective.residual."""

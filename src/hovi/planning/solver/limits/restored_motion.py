@@ -53,7 +53,8 @@ def locally_infeasible(search: BoundedSearch, ended: Bounded) -> str:
     if search.clearance is not None or search.free_duration:
         return ""
     rows, search.rows = search.rows, search.fine_rows()
-    penalty = LEAST_VIOLATION_PENALTY * ended.outputs.density(problem.grid.duration)
+    cost = max(abs(problem.ld.action(ended.x)), 1e-12)
+    penalty = LEAST_VIOLATION_PENALTY * cost / problem.grid.duration
     known = first_multipliers(problem, ended.x) if problem.constrained else None
     objective = search.objective(known)
     penalized = PenalizedAction(objective, penalty)
@@ -64,15 +65,15 @@ def locally_infeasible(search: BoundedSearch, ended: Bounded) -> str:
         found.append(each)
         if each.why in STOPPED:
             ended.why = each.why
-        kept = penalized.violation(each.x) <= SMALL_VIOLATION
-        if not penalized.is_least(each) or (kept and not search.unsatisfied(each.x)):
+        within = penalized.violation(each.x) <= SMALL_VIOLATION
+        if not penalized.is_least(each) or (within and not search.unsatisfied(each.x)):
             break
     else:
         most = SAME_VIOLATION * min(penalized.squares(each.x) for each in found)
         same = [each.x for each in found if penalized.squares(each.x) <= most]
         if len(same) > 1:
             ended.x = min(same, key=penalized.action)
-            ended.outputs = objective.outputs(ended.x)
+            ended.outputs = search.objective(known).outputs(ended.x)
             ended.z = Barrier.inactive(objective.bounds, ended.outputs.y)
             return search.unsatisfied(ended.x) or search.worst(ended.x)
     search.rows = rows
@@ -96,7 +97,8 @@ def restored_motion(search: BoundedSearch, ended: Bounded) -> tuple[Bounded, str
         if violation <= SMALL_VIOLATION:
             search.multipliers, search.rows = None, search.coarse_rows()
             again = search.solve(Start(path))
-            if again.feasible or again.why in STOPPED:
+            found = again.feasible and not search.unsatisfied(again.x)
+            if found or again.why in STOPPED:
                 return again, ""
         if violation < least:
             least, ended.x = violation, path

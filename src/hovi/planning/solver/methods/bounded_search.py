@@ -239,7 +239,8 @@ class BoundedSearch:
         ended = self.minimized(objective, start, self.remaining_criteria())
         if known is None:
             return ended
-        self.multipliers = objective.action.multipliers
+        if ended.why is not Reason.DIVERGED:
+            self.multipliers = objective.action.multipliers
         self.unmet = ""
         if ended.why is Reason.STATIONARY:
             self.unmet = self.unsatisfied(ended.x)
@@ -308,7 +309,7 @@ class BoundedSearch:
     def forces(self, ended: Bounded) -> tuple[Instants | None, list[PointTerms]]:
         """The instants between the points at which limits act, and all multipliers.
 
-        Those of limits and constraints, penalty terms of the constraints included.
+        Those of limits and of constraints.
         """
         multipliers = self._objective_of(ended).plain(ended.z.multipliers)
         limits = len(multipliers) - (0 if self.near is None else self.near.size)

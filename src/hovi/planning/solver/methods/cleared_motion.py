@@ -9,10 +9,9 @@ import numpy as np
 from hovi.discrete.grid import DiscretePath
 from hovi.optimize.ended import STOPPED, Reason
 from hovi.optimize.start import Start
-from hovi.planning.solver.first_multipliers import first_multipliers
+from hovi.planning.solver.first_multipliers import first_multipliers, first_penalty
 from hovi.planning.solver.limits.limit_rows import LimitRows
 from hovi.planning.solver.methods.bounded_search import (
-    ROUGH_TOLERANCES,
     Bounded,
     BoundedSearch,
 )
@@ -121,7 +120,9 @@ def _rough(
     known: Multipliers | None,
     mu: float | None,
 ) -> tuple[Bounded, Multipliers | None]:
-    """A solve up to a large barrier parameter, and the multipliers of conditions then.
+    """A solve up to a large barrier parameter, and the multipliers of equations then.
+
+    Equations are missed by a little, at a price.
 
     known: multipliers of constraints. mu: the first such parameter, None for a start at the guess.
     """
@@ -129,6 +130,11 @@ def _rough(
     criteria = dataclasses.replace(
         criteria, max_iterations=min(ROUGH_STEPS, criteria.max_iterations)
     )
-    objective = search.objective(known, tolerances=ROUGH_TOLERANCES)
+    objective = search.objective(known)
+    if known is not None:  # near obstacles, steps that satisfy equations at once lead to fewer ways
+        objective.penalty = first_penalty(search.problem, path)
     start = Start(path) if mu is None else search.start_at(path, mu, objective)
-    return search.minimized(objective, start, criteria), objective.action.multipliers
+    ended = search.minimized(objective, start, criteria)
+    if known is not None:
+        objective.hold(objective.penalty * objective.residual(ended.x))
+    return ended, objective.action.multipliers

@@ -43,8 +43,8 @@ def feasible_motion(search: BoundedSearch) -> tuple[Bounded, str]:
     if search.near is not None:
         failed = ended.why is Reason.DIVERGED and not ended.feasible
         return ended, search.worst(ended.x) if failed else ""
-    satisfied = ended.feasible and not search.unsatisfied(ended.x)
-    if satisfied or ended.why is not Reason.DIVERGED:
+    failed = ended.why is Reason.DIVERGED
+    if not failed or (ended.feasible and not search.unsatisfied(ended.x)):
         return ended, ""
     reason = locally_infeasible(search, ended)
     if reason or ended.why in STOPPED:
@@ -63,7 +63,10 @@ def _solved_nearby(search: BoundedSearch) -> Bounded | None:
     search.criteria = dataclasses.replace(whole, max_iterations=most)
     ended = solved_from(search, search.guess) if along is None else _solved_along(search, along)
     search.criteria = whole
-    return ended if ended.settled else None
+    if ended.settled and not search.unmet:
+        return ended
+    search.multipliers, search.unmet = None, ""
+    return None
 
 
 def _solved_at_all(search: BoundedSearch) -> Bounded:

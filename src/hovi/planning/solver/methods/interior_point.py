@@ -41,7 +41,7 @@ def takes_rows(problem: TrajectoryProblem) -> bool:
 
 
 class InteriorPoint(Method):
-    """A primal-dual interior-point method; passive torques by an augmented Lagrangian around it.
+    """A primal-dual interior-point method, whose steps satisfy equations to first order.
 
     First a motion within bounds at the quadrature points is found; then bounds are tightened and
     intervals halved until the limits hold everywhere to their tolerance.
