@@ -144,9 +144,7 @@ class BoundedAction(BoundedObjective[DiscretePath]):
         if self.penalty == 0.0:
             return self._model(x, sigma, rho, multipliers)
         with self._held(x):
-            model = self._model(x, sigma, rho, multipliers)
-        assert isinstance(model, BandModel)
-        return self.action.with_penalty(x, model, self.penalty)
+            return self._model(x, sigma, rho, multipliers)
 
     @contextmanager
     def _held(self, x: DiscretePath) -> Iterator[None]:
@@ -179,8 +177,12 @@ class BoundedAction(BoundedObjective[DiscretePath]):
         return self._under_equations(x, model)
 
     def _under_equations(self, x: DiscretePath, model: QuadraticModel) -> QuadraticModel:
-        """The model, whose steps satisfy equations to first order if they are to."""
-        if self.tolerances is None or not isinstance(model, BandModel):
+        """The model, whose steps satisfy equations to first order, or with their penalty."""
+        if not isinstance(model, BandModel):
+            return model
+        if self.penalty > 0.0:
+            return self.action.with_penalty(x, model, self.penalty)
+        if self.tolerances is None:
             return model
         return self.action.under_equations(x, model)
 
