@@ -87,7 +87,7 @@ _rule(
     "chord steps",
     "The last digits come by gradients with the last factorisation.",
     "_iterate",
-    "settled and accepted and exact and not last and trial.factor is not None",
+    "settled and accepted and exact and not last",
     "False",
 )
 _rule(
@@ -475,7 +475,7 @@ _rule(
 )
 _at("equations", "planning.solver.methods.lagrange_newton")
 _rule(
-    "one round before Lagrange-Newton",
+    "a penalty before Lagrange-Newton",
     "With equations at nodes alone a rough minimisation with a penalty comes first.",
     "_minimized",
     "begin.z is not None or objective.problem.along or len(objective.problem.passive) > 0",

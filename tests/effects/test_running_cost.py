@@ -284,7 +284,7 @@ def test_a_joint_without_a_motor_has_no_torque_to_pay_for(two_link: Robot) -> No
 
 
 def test_a_joint_without_a_motor_swings_where_no_torque_has_a_weight(two_link: Robot) -> None:
-    """Its torque is an equation, whose penalty is scaled by the weights there are."""
+    """Its torque is an equation."""
     more = [EffortWeight(0.0), RunningCost({"x": "0.5*dot(tau, tau)"})]
     ends = np.array([-1.5, 0.0]), np.array([-1.2, 0.0])
     known, found = (

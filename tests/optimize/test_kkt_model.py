@@ -12,6 +12,7 @@ from hovi.optimize.bordered_model import Border, BorderedModel
 from hovi.optimize.equation_model import NORMAL, EquationFactor, EquationModel, PenaltyModel
 from hovi.optimize.kkt_model import ConstraintRows, KktLayout, KktModel
 from hovi.optimize.quadratic_model import IntervalSum
+from hovi.optimize.trust_region import solve_subproblem
 
 Array = np.ndarray
 N, M, DOF = 6, 5, 2
@@ -252,6 +253,21 @@ def test_a_shift_keeps_what_takes_the_residual_away_within_the_radius(radius: fl
     s, z = np.split(np.linalg.solve(kkt, -np.append(steps.gradient, fraction * c)), [size])
     np.testing.assert_allclose(step, s, atol=1e-9 * np.abs(s).max())
     assert slope == pytest.approx(steps.gradient @ s + fraction * z @ c, rel=1e-8)
+
+
+@pytest.mark.parametrize("radius", [0.5, 5.0, 50.0])
+@pytest.mark.parametrize("size", [1.0, 100.0])
+def test_steps_under_equations_stay_within_the_radius(radius: float, size: float) -> None:
+    """Also where the whole Newton step is far longer than steps for small shifts."""
+    for seed in range(12):
+        of = model(seed=seed)
+        _, A, _ = dense(of)
+        c = size * (A @ np.random.default_rng(seed).standard_normal(len(of.gradient)))
+        steps = EquationModel(of.plain, of, c)
+        for guess in (0.0, 1e-3, 1.0):
+            trial = solve_subproblem(steps, radius, guess)
+            assert trial.norm <= 1.25 * radius
+            assert trial.newton or trial.norm > 0.5 * radius
 
 
 def test_multipliers_of_a_shifted_step_are_those_of_least_squares() -> None:

@@ -177,14 +177,6 @@ class DiscreteLagrangian:
         parts = zip(self.lagrangians, expansion.outputs, steps, strict=True)
         return [L.predicted_slope(y, J, dx) for L, (y, J), dx in parts]
 
-    def predicted_outputs(
-        self, expansion: Expansion, step: Array, coordinates: Coordinates
-    ) -> list[Array]:
-        """y + J dx at the quadrature points after a step, (P, m) per batch; step as above."""
-        steps = self._point_steps(step, coordinates, expansion)
-        pairs = zip(expansion.outputs, steps, strict=True)
-        return [y + np.matmul(J, dx[:, :, None])[:, :, 0] for (y, J), dx in pairs]
-
     def point_steps(
         self, step: Array, coordinates: Coordinates, expansion: Expansion
     ) -> list[Array]:

@@ -130,13 +130,13 @@ class BorderedModel(QuadraticModel):
         low, high = self.border.room
         return np.asarray(~(((low == 0) & (slope > 0)) | ((high == 0) & (slope < 0))))
 
-    def reaction(self, gradient: Array, s: Array, factor: Factor | None) -> tuple[Array, Array]:
+    def reaction(self, gradient: Array, s: Array, factor: Factor) -> tuple[Array, Array]:
         """That of the inner model for the gradient g + B t, with the step t."""
         assert isinstance(factor, BorderedFactor)
         x, t = s[: self.size], s[self.size :]
         return self.inner.reaction(gradient[: self.size] + self.border.columns @ t, x, factor.inner)
 
-    def correction(self, factor: Factor | None, taken: float, residual: Array) -> Array:
+    def correction(self, factor: Factor, taken: float, residual: Array) -> Array:
         """That of the inner model."""
         assert isinstance(factor, BorderedFactor)
         still = np.zeros_like(self.border.slope)

@@ -164,7 +164,6 @@ class BoundedSteps(Generic[X]):
     ) -> tuple[Direction, Array, Array]:
         """The direction for given targets, its step, and the change of the gradient."""
         barrier, y = self.ended.z, self.ended.outputs.y
-        assert trial.factor is not None
         pulled = self.objective.pull(barrier.shift(barrier.mu, targets), model)
         s = trial.step - trial.factor.solve(pulled)
         return barrier.aim(y, self.objective.push(s, model), targets), s, pulled

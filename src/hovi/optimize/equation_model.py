@@ -107,13 +107,13 @@ class EquationModel(_WithEquations):
         slope = float(g @ s) + factor.fraction * float(z @ c)
         return s, slope, float(s @ self.metric_product(s))
 
-    def reaction(self, gradient: Array, s: Array, factor: Factor | None) -> tuple[Array, Array]:
+    def reaction(self, gradient: Array, s: Array, factor: Factor) -> tuple[Array, Array]:
         """See QuadraticModel.reaction."""
         assert isinstance(factor, EquationFactor)
         c = self.residual if factor.shift == 0.0 else np.zeros_like(self.residual)
         return factor.kkt.solve(-gradient, -c)[1], self.kkt.jacobian_product(s)
 
-    def correction(self, factor: Factor | None, taken: float, residual: Array) -> Array:
+    def correction(self, factor: Factor, taken: float, residual: Array) -> Array:
         """See QuadraticModel.correction."""
         assert isinstance(factor, EquationFactor)
         target = (1.0 - taken * factor.fraction) * self.residual - residual

@@ -15,6 +15,11 @@ exact penalty of |y - s|; the model keeps the barrier as it is and linearises y 
 step fails, mu stays until its problem is solved. [WaechterBiegler2006; NocedalWright2006, chapter
 19]
 
+Steps satisfy equations c = 0 to first order, A s = -c, or a fraction of c where the trust region
+shortens them, and their multipliers change with every step (hovi.optimize.equation_model). Progress
+is then measured with the multipliers after the step, and by |c|^2 where that would be none. A step
+whose merit falls by less than half of what it predicts is corrected for the curvature of c.
+
 Where the Hessian is indefinite, the objective may give a model without the negative curvature of
 outputs, with which mu falls sooner. At a stationary point, and from there on, the model is exact:
 saddles are left.

@@ -76,14 +76,14 @@ class QuadraticModel(ABC):
         slope = float(np.vdot(self.gradient, s))
         return s, slope, float(np.vdot(s, self.metric_product(s)))
 
-    def reaction(self, gradient: Array, s: Array, factor: Factor | None) -> tuple[Array, Array]:
+    def reaction(self, gradient: Array, s: Array, factor: Factor) -> tuple[Array, Array]:
         """Change of the multipliers of equations with a step s, and A s.
 
         gradient: for whose step the multipliers are sought.
         """
         raise NotImplementedError
 
-    def correction(self, factor: Factor | None, taken: float, residual: Array) -> Array:
+    def correction(self, factor: Factor, taken: float, residual: Array) -> Array:
         """A step that takes away what the residual after a fraction of the last one is too large.
 
         It is the second-order correction of that step. taken: the fraction.

@@ -97,8 +97,8 @@ class Trial(NamedTuple):
     decrease: float
     shift: float
     norm: float
+    factor: Factor
     along_negative_curvature: bool = False
-    factor: Factor | None = None
 
     @property
     def newton(self) -> bool:
@@ -160,7 +160,7 @@ def _iterate(
             if trial.along_negative_curvature and stationary:
                 ended.saddles.append(ended.value)
             ended.x, ended.outputs = candidate, _values(value)
-        if settled and accepted and exact and not last and trial.factor is not None:
+        if settled and accepted and exact and not last:
             polished = polish(objective, candidate, value, model, trial.factor, trial.decrease)
             if polished is not None:
                 last, ended.x, ended.outputs = True, polished[0], _values(polished[1])
@@ -271,7 +271,7 @@ class _ShiftSearch:
         decrease = -0.5 * slope + 0.5 * shift * norm2
         if not math.isfinite(decrease) or (decrease == 0.0 and self.model.gradient.any()):
             raise ArithmeticError("the model has non-finite entries")
-        return Trial(s, decrease, shift, math.sqrt(norm2), factor=factor)
+        return Trial(s, decrease, shift, math.sqrt(norm2), factor)
 
     def after_step(self, factor: Factor, trial: Trial) -> float:
         """The next shift after a step that is too long or too short."""
@@ -337,4 +337,4 @@ class _ShiftSearch:
         rayleigh = 1.0 / float(np.vdot(Du, factor.solve(Du))) - trial.shift
         decrease = trial.decrease + trial.shift * b * length - 0.5 * length**2 * min(rayleigh, 0.0)
         alone = trial.norm < 1e-6 * self.radius
-        return Trial(step, decrease, trial.shift, self.radius, alone, factor)
+        return Trial(step, decrease, trial.shift, self.radius, factor, alone)

@@ -184,7 +184,7 @@ class ActionObjective(Objective[DiscretePath]):
     ) -> QuadraticModel:
         """The quadratic model at x, its curvature weighted by the predicted outputs."""
         if previous is not None and step is not None and self._expansion is not None:
-            curvatures = self.plus_multipliers(self.predicted_slopes(previous.gather(step)))
+            curvatures = self.predicted_slopes(previous.gather(step))
         else:
             curvatures = [self.output_slope(y, i) for i, y in enumerate(self.outputs(x))]
         return self.model_with(x, curvatures, None)
@@ -195,12 +195,6 @@ class ActionObjective(Objective[DiscretePath]):
         step: in the columns of the intervals, shape (N, m, n).
         """
         return _predict(self.ld, self.expansion, step, self.coordinates)
-
-    def plus_multipliers(self, slopes: list[Array]) -> list[Array]:
-        """Slopes R y at the points, per batch, plus the multipliers of torques."""
-        if self.multipliers is None:
-            return slopes
-        return [slope + more for slope, more in zip(slopes, self.multipliers.torque, strict=True)]
 
     def model_with(
         self,

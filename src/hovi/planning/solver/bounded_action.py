@@ -360,7 +360,7 @@ class BoundedAction(BoundedObjective[DiscretePath]):
         self.predict(self.action.predicted_slopes(model.gather(step)))
 
     def predict(self, slopes: list[Array]) -> None:
-        """Take `output_slope` of predicted outputs, per batch; those of the path if empty."""
+        """Take R y of predicted outputs, per batch; those of the path if empty."""
         self._predicted = slopes or None
 
     def hold(self, change: Array) -> None:
@@ -474,7 +474,7 @@ class BoundedAction(BoundedObjective[DiscretePath]):
         return Points(q, v, np.concatenate(self.ld.point_times), a, tau)
 
     def _slope(self, x: DiscretePath, batch: int) -> Array:
-        """R y as predicted, or at x before the first step."""
+        """R y as predicted, or at x before the first step, plus the multipliers of torques."""
         if self._predicted is not None:
             known = self.action.multipliers
             slope = self._predicted[batch]
