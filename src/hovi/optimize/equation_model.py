@@ -45,7 +45,7 @@ class EquationFactor:
 
 
 class _WithEquations(QuadraticModel):
-    """A banded model, and equations beside it.
+    """A banded model with equations.
 
     kkt: the same with the equations.
     """

@@ -79,7 +79,7 @@ class QuadraticModel(ABC):
     def reaction(self, gradient: Array, s: Array, factor: Factor) -> tuple[Array, Array]:
         """Change of the multipliers of equations with a step s, and A s.
 
-        gradient: for whose step the multipliers are sought.
+        gradient: of the step that the multipliers belong to.
         """
         raise NotImplementedError
 

@@ -50,7 +50,7 @@ class Multipliers:
 
     torque: lambda of every joint at the quadrature points, (P, nv) per batch, zero where a joint
         is not passive. conditions: mu, see `Equations.conditions`.
-    scale: of conditions beside torques, see `Equations`. jet_size: numbers (k+1) nv of the jet at
+    scale: of conditions next to torques, see `Equations`. jet_size: numbers (k+1) nv of the jet at
         a point.
     """
 
