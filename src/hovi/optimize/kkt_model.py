@@ -310,7 +310,7 @@ class KktModel:
         scale = largest**2 / curvature if curvature > 0.0 else np.zeros_like(largest)
         return np.where(scale > 0.0, scale, 1.0)[known]
 
-    def factor(self, shift: float, delta: Array | float | None = None) -> KktFactor | None:
+    def factor(self, shift: float, delta: float | None = None) -> KktFactor | None:
         """The factor; None where H + shift D is not positive definite on A s = 0.
 
         delta: as a part of the system to solve; a small one, which refinement removes, if None.

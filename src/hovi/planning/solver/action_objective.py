@@ -93,6 +93,7 @@ class ActionObjective(Objective[DiscretePath]):
         self._expansion: Expansion | None = None
         self._last: tuple[DiscretePath, list[Jet]] | None = None
         self._outputs: tuple[DiscretePath, list[Array]] | None = None
+        self._residual: tuple[DiscretePath, Array] | None = None
 
     @cached_property
     def negligible(self) -> float:
@@ -270,10 +271,12 @@ class ActionObjective(Objective[DiscretePath]):
         return KktModel(model.intervals, rows, none, layout, *bands)
 
     def residual(self, x: DiscretePath) -> Array:
-        """c of the equations at x, (E,); none without multipliers."""
+        """c of the equations at x, (E,), none without multipliers; the last one is cached."""
         if self.multipliers is None:
             return np.zeros(0)
-        return self.equations.residual(x, self.outputs(x), self.jets(x))
+        if self._residual is None or self._residual[0] is not x:
+            self._residual = x, self.equations.residual(x, self.outputs(x), self.jets(x))
+        return self._residual[1]
 
     @cached_property
     def equations(self) -> Equations:

@@ -6,7 +6,6 @@ import copy
 import dataclasses
 import itertools
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from functools import cached_property
 from typing import Self
 
@@ -143,18 +142,11 @@ class BoundedAction(BoundedObjective[DiscretePath]):
         """The model of the action with the terms of the bounds: see BoundedObjective.model."""
         if self.penalty == 0.0:
             return self._model(x, sigma, rho, multipliers)
-        with self._held(x):
-            return self._model(x, sigma, rho, multipliers)
-
-    @contextmanager
-    def _held(self, x: DiscretePath) -> Iterator[None]:
-        """With the forces of the penalty as multipliers."""
-        none = self.action.multipliers
-        self.action.hold(self.penalty * self.residual(x))
+        self.hold(self.penalty * self.residual(x))
         try:
-            yield
+            return self._model(x, sigma, rho, multipliers)
         finally:
-            self.action.multipliers = none
+            self.let_go()
 
     def _model(
         self, x: DiscretePath, sigma: Array, rho: Array, multipliers: Array
