@@ -35,6 +35,7 @@ WITH_ORACLES = {
     "planning/refinement/test_hp_refinement.py",
     "planning/solver/free_duration/test_parts_of_free_length.py",
     "planning/solver/limits/test_limit_rows.py",
+    "planning/solver/near/test_rows_on_groups.py",
     "planning/solver/test_equations_along.py",
     "samples/interval_problems.py",
     "test_rules.py",

@@ -621,21 +621,13 @@ _rule(
     "int(short)",
     "0",
 )
-_at("distances", "planning.solver.methods.interior_point")
+_at("distances", "planning.solver.methods.free_first")
 _rule(
-    "rows of distances",
-    "Distances are rows where pairs come near, not outputs at all points.",
-    "takes_rows",
-    "problem.has_limits or problem.clearance.self_collision",
+    "free first",
+    "What distances alone limit is solved without them first, by a method without limits.",
+    "FreeFirst.supports",
+    "problem.distances is not None and not problem.apart_from().limited",
     "False",
-)
-_at("distances", "planning.solver.methods.active_pairs")
-_rule(
-    "pairs that touch at first",
-    "At the points, pairs within 2 mm along the guess are bounded from the beginning.",
-    "_Rounds.run",
-    "self._too_close(self._problem, path, FIRST_BEYOND)",
-    "np.zeros(0, dtype=np.intp)",
 )
 _at("distances", "planning.solver.methods.cleared_motion")
 _rule(

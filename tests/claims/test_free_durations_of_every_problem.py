@@ -72,7 +72,8 @@ def test_via_points_keep_their_times() -> None:
         planned("a via point", (0.3, 3.0))
 
 
-def test_a_gate_that_opens_is_waited_for() -> None:
+@pytest.mark.parametrize("limits", ["none", {"base": "none", "v": 100.0}], ids=["free", "limited"])
+def test_a_gate_that_opens_is_waited_for(limits: Any) -> None:
     """A ball leaves the end of a way: less time would be cheaper, were it not there."""
     path = {"times": [0.0, 10.0], "positions": [[0.0, 0.9, 0.0], [0.0, 0.9, 4.0]]}
     ball = hovi.Sphere([0.0, 0.0, 0.0], 0.3, path=path, name="ball")
@@ -80,7 +81,7 @@ def test_a_gate_that_opens_is_waited_for() -> None:
 
     def slid(duration: Any, **more: Any) -> hovi.Solution:
         given = {"scheme": "galerkin-2x8", "intervals": 30, "self_collision": False} | more
-        return hovi.plan(scene, [0.0], [0.8], duration, limits="none", obstacles=[ball], **given)
+        return hovi.plan(scene, [0.0], [0.8], duration, limits=limits, obstacles=[ball], **given)
 
     found = slid((0.2, 9.0), time_weight=100.0)
     T = found.trajectory.duration

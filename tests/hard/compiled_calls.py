@@ -188,12 +188,14 @@ _CHARTS = {
     **{"x": _in("3 B*Q n"), "ends": _in("B 2 n")},
 }
 _PORTABLE = {"portable": False}
+_OWN_TABLES = {**_CHARTS, "table": _in("B 3 m"), "weights": _in("B"), "x": _in("3 B n")}
 _GROUPS = {"fits": _layout_fits}
 _ON_CHARTS = {
     "letters": {"Q": (0, 3), "m": (4, 7), "B": (0, 6)},
     "fits": lambda arguments, sizes: _layout_fits(arguments, sizes) and sizes["m"] >= 4,
     "scalars": _PORTABLE,
 }
+_OF_EACH = {**_ON_CHARTS, "letters": {"m": (4, 7), "B": (1, 6)}}
 
 # Intervals
 
@@ -664,6 +666,20 @@ ENTRIES: dict[str, Entry] = {
         groups.push_steps,
         {**_CHARTS, "step": _in("B m n"), "change": _out("B Q 3 n")},
         **_ON_CHARTS,
+    ),
+    "groups.expand, tables of each": Entry(
+        groups.expand,
+        {
+            **_OWN_TABLES,
+            **{"gradient": _in("B 3*n"), "hessian": _in("B 3*n 3*n")},
+            **{"columns_gradient": _out("B m n"), "columns_hessian": _out("B m m n n")},
+        },
+        **_OF_EACH,
+    ),
+    "groups.push_steps, tables of each": Entry(
+        groups.push_steps,
+        {**_OWN_TABLES, "step": _in("B m n"), "change": _out("B 1 3 n")},
+        **_OF_EACH,
     ),
     "intervals.contract": Entry(
         intervals.contract,

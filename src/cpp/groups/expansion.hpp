@@ -120,7 +120,7 @@ inline void push_ends(const IntervalCharts& intervals, Pack* step) {
 inline void push_point(const IntervalCharts& intervals, std::size_t q, const Pack* step,
                        Pack* change) {
   const std::size_t n = intervals.dof(), m = intervals.charts.columns;
-  const double* const table = intervals.charts.table + 3 * q * m;
+  const Pack* const table = intervals.table(q);
   std::copy_n(step, n, change);
   std::fill(change + n, change + 4 * n, Pack{});
   for (std::size_t r = 0; r < 3; ++r)

@@ -97,7 +97,7 @@ struct TileRows {
       add_bend<Group>(maps);
       for (std::size_t r = 0; r < 4; ++r) rows[r] = both + r * order;
     });
-    const double* const table = intervals.charts.table + 3 * q * m;
+    const Pack* const table = intervals.table(q);
     for (std::size_t i = 0; i < k; ++i)
       for (std::size_t j = i; j < width; ++j)
         contract(table, rows, i * row + j, sums + (i * width + j) * m * m);
@@ -130,9 +130,9 @@ struct TileRows {
   }
 
   // sum += A^T H A for one entry of the four by four blocks; q0 stands for itself.
-  void contract(const double* table, const Pack* const (&rows)[4], std::size_t entry,
+  void contract(const Pack* table, const Pack* const (&rows)[4], std::size_t entry,
                 Pack* sum) const {
-    const double *const A = table, *const B = A + m, *const C = B + m;
+    const Pack *const A = table, *const B = A + m, *const C = B + m;
     for (std::size_t r = 0; r < 4; ++r) {
       const Pack* const H = rows[r] + entry;
       const Pack base = H[0], x = H[width], y = H[2 * width], z = H[3 * width];
@@ -147,15 +147,12 @@ struct TileRows {
 
   // Rows of A^T (H A).
   template <std::size_t count>
-  void add_rows(const double* A, Pack* sum) const {
+  void add_rows(const Pack* A, Pack* sum) const {
     const Pack *const x = products + m, *const y = x + m, *const z = y + m;
-    Pack a[count], b[count], c[count];
-    for (std::size_t i = 0; i < count; ++i)
-      a[i] = broadcast(A[i]), b[i] = broadcast(A[m + i]), c[i] = broadcast(A[2 * m + i]);
     for (std::size_t j = 0; j < m; ++j) {
       const Pack xj = x[j], yj = y[j], zj = z[j];
       for (std::size_t i = 0; i < count; ++i)
-        sum[i * m + j] += a[i] * xj + b[i] * yj + c[i] * zj;
+        sum[i * m + j] += A[i] * xj + A[m + i] * yj + A[2 * m + i] * zj;
     }
   }
 

@@ -26,6 +26,7 @@ struct IntervalCharts {
   Rows rows;
   Pack h;
   Pack *points, *ends;        // maps of every part
+  Pack *tables, *weights;     // (Q, 3, m) and (Q)
   Pack *gradient, *lifted;    // (m, n) and (4, n)
   Pack* rest;                 // what is left of the workspace
 
@@ -34,7 +35,7 @@ struct IntervalCharts {
 
   static std::size_t size(const Charts& charts) {
     return charts.space.parts * (charts.points * point_packs + end_packs) +
-           (charts.columns + 4) * charts.space.nv;
+           charts.points * (3 * charts.columns + 1) + (charts.columns + 4) * charts.space.nv;
   }
 
   IntervalCharts(const Charts& all, std::size_t first, double* workspace)
@@ -42,13 +43,19 @@ struct IntervalCharts {
     read(charts.steps, 1, rows, 1, &h);
     points = reinterpret_cast<Pack*>(workspace);
     ends = points + charts.space.parts * charts.points * point_packs;
-    gradient = ends + charts.space.parts * end_packs;
+    tables = ends + charts.space.parts * end_packs;
+    const std::size_t Q = charts.points, entries = Q * 3 * charts.columns;
+    read(charts.table, charts.own_tables * entries, rows, entries, tables);
+    weights = tables + entries;
+    read(charts.weights, charts.own_tables * Q, rows, Q, weights);
+    gradient = weights + Q;
     lifted = gradient + charts.columns * charts.space.nv;
     rest = lifted + 4 * charts.space.nv;
   }
 
   std::size_t dof() const { return charts.space.nv; }
   const Part& part(std::size_t f) const { return charts.space.part[f]; }
+  const Pack* table(std::size_t q) const { return tables + 3 * q * charts.columns; }
 
   template <typename Group>
   PointMaps<Group>& at_point(std::size_t q, std::size_t f) const {
@@ -83,9 +90,9 @@ struct IntervalCharts {
 
   // h w_q / (1, h, h^2).
   void weigh(std::size_t q, Pack (&weight)[3]) const {
-    weight[0] = charts.weights[q] * h;
-    weight[1] = broadcast(charts.weights[q]);
-    weight[2] = charts.weights[q] / h;
+    weight[0] = weights[q] * h;
+    weight[1] = weights[q];
+    weight[2] = weights[q] / h;
   }
 
   // The weighted gradient at the points, as that in the charts' columns (q0, h v0, x1, h x1', c).
@@ -148,12 +155,12 @@ struct IntervalCharts {
   // gradient += table_q^T lifted; q0 moves the chart and nothing in it.
   void contract(std::size_t q) const {
     const std::size_t n = dof(), m = charts.columns;
-    const double* const table = charts.table + 3 * q * m;
+    const Pack* const A = table(q);
     for (std::size_t i = 0; i < n; ++i) gradient[i] += lifted[i];
     for (std::size_t r = 0; r < 3; ++r)
       for (std::size_t j = 1; j < m; ++j)
         for (std::size_t i = 0; i < n; ++i)
-          gradient[j * n + i] += table[r * m + j] * lifted[(r + 1) * n + i];
+          gradient[j * n + i] += A[r * m + j] * lifted[(r + 1) * n + i];
   }
 
   // The charts' Jacobians at the ends, and their Hessians weighted by the gradient.

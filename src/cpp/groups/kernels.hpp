@@ -20,12 +20,13 @@ struct Space {
   const Part* part;
 };
 
-// The charts of intervals of one scheme.
+// The charts of intervals, of one scheme or with tables of their own.
 struct Charts {
   Space space;
   std::size_t intervals, points, columns;  // B, Q, m
-  const double* table;                     // (Q, 3, m)
-  const double* weights;                   // (Q)
+  bool own_tables;                         // of every interval, or shared
+  const double* table;                     // (Q, 3, m), or (B, Q, 3, m)
+  const double* weights;                   // (Q), or (B, Q)
   const double* steps;                     // (B)
   const double* x;                         // (x, x', x''), (3, B, Q, n)
   const double* ends;                      // (x1, h x1'), (B, 2, n)

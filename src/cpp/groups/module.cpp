@@ -76,13 +76,15 @@ Charts charts_of(const Parts& parts, const Input<3>& table, const Input<1>& weig
                  const Input<1>& steps, const Input<3>& x, const Input<3>& ends) {
   table.require_kind("table");
   steps.require_kind("steps");
-  const std::size_t Q = table.shape(0), m = table.shape(2), B = steps.shape(0), n = parts.nv();
-  table.require("table", {Q, 3, std::max<std::size_t>(4, m)});
-  weights.require("weights", {Q});
+  const std::size_t m = table.shape(2), B = steps.shape(0), n = parts.nv(), rows = table.shape(0);
+  const bool own_tables = B > 1 && rows > 0 && rows == x.shape(1);
+  const std::size_t Q = own_tables ? rows / B : rows;
+  table.require("table", {rows, 3, std::max<std::size_t>(4, m)});
+  weights.require("weights", {rows});
   x.require("x", {3, B * Q, n});
   ends.require("ends", {B, 2, n});
-  return {parts.space(), B,        Q, m, table.data(), weights.data(), steps.data(),
-          x.data(),      ends.data()};
+  return {parts.space(), B,           Q,        m,         own_tables, table.data(),
+          weights.data(), steps.data(), x.data(), ends.data()};
 }
 
 void integrate(const Layout& layout, const Input<2>& q, const Input<2>& x,

@@ -9,14 +9,13 @@ import numpy.typing as npt
 
 from hovi._native import intervals as native
 from hovi.checks.kinds import compact
-from hovi.discrete.instants import InstantBatch, InstantCharts
+from hovi.discrete.instants import InstantBatch
 from hovi.discrete.interval_batch import IntervalBatch
 from hovi.discrete.interval_charts import Charts
 from hovi.scene.lagrangian import PointExpansion
 from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
-AnyCharts = Charts | InstantCharts
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +38,7 @@ class Expansion:
     gradient: Array
     hessian: Array
     outputs: list[tuple[Array, Array]]
-    charts: list[AnyCharts] | None = None
+    charts: list[Charts] | None = None
     points: list[PointExpansion] | None = None
 
     def __post_init__(self) -> None:
@@ -51,7 +50,7 @@ class Expansion:
         """The discrete action, the sum of all L_d."""
         return float(np.sum(self.values))
 
-    def charts_of(self, batch: int) -> AnyCharts | None:
+    def charts_of(self, batch: int) -> Charts | None:
         """The charts of a batch of intervals; None if they are the identity."""
         return None if self.charts is None else self.charts[batch]
 

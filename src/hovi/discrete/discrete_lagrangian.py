@@ -14,11 +14,11 @@ import numpy.typing as npt
 
 from hovi.checks.arguments import check_arguments
 from hovi.checks.shapes import require_shape
-from hovi.discrete.contraction import AnyCharts, Expansion, contract, joined
+from hovi.discrete.contraction import Expansion, contract, joined
 from hovi.discrete.grid import MORE_MODES, DiscretePath, Grid
 from hovi.discrete.instants import InstantBatch, Instants, instant_batches
 from hovi.discrete.interval_batch import Coordinates, IntervalBatch, Jet, interval_batches
-from hovi.discrete.interval_charts import charts_on, jet_on
+from hovi.discrete.interval_charts import Charts, charts_on, jet_on
 from hovi.errors import InputError, SchemeError
 from hovi.robot.space.chart import Chart
 from hovi.scene.lagrangian import Lagrangian, NoCost, PointTerms, time_slope
@@ -384,13 +384,11 @@ class DiscreteLagrangian:
             return batch.jet_on(space, path)
         return jet_on(space, batch, path)
 
-    def _charts(self, path: DiscretePath) -> list[AnyCharts] | None:
+    def _charts(self, path: DiscretePath) -> list[Charts] | None:
         return None if self.chart is None else [self._charts_of(b, path) for b in self.batches]
 
-    def _charts_of(self, batch: Batch, path: DiscretePath) -> AnyCharts:
+    def _charts_of(self, batch: Batch, path: DiscretePath) -> Charts:
         assert self.chart is not None
-        if isinstance(batch, InstantBatch):
-            return batch.charts(self.chart, path)
         return charts_on(self.chart, batch, path)
 
     @cached_property

@@ -11,8 +11,7 @@ import numpy.typing as npt
 from hovi.checks.arguments import check_arguments
 from hovi.checks.shapes import require_shape
 from hovi.discrete.grid import DiscretePath, Grid
-from hovi.discrete.interval_batch import Coordinates, IntervalBatch, Jet
-from hovi.discrete.interval_charts import Charts, charts_on
+from hovi.discrete.interval_batch import Coordinates, Jet
 from hovi.discrete.interval_paths import displacements_at, scaled_data
 from hovi.errors import InputError
 from hovi.robot.space.chart import Chart
@@ -163,20 +162,15 @@ class InstantBatch:
         weighted = gradient * self.barrier_weights[:, None, None]
         return np.asarray(np.matmul(self.step_tables[coordinates].transpose(0, 2, 1), weighted))
 
-    def charts(self, chart: Chart, path: DiscretePath) -> InstantCharts:
-        """The charts of the intervals, on noncommutative groups."""
-        return InstantCharts([charts_on(chart, each, path) for each in self._alone])
-
     @cached_property
-    def _alone(self) -> list[IntervalBatch]:
-        """One batch for each instant."""
-        return [self._batch_of(i) for i in range(len(self.s))]
+    def scheme(self) -> Scheme:
+        """A scheme whose points and tables are those of the instants, one of each interval."""
+        return Scheme("instants", 0, self.s, self.contraction_weights, self.table)
 
-    def _batch_of(self, i: int) -> IntervalBatch:
-        here = slice(i, i + 1)
-        weight, number = self.contraction_weights[here], self.numbers[here]
-        one = Scheme("instant", 0, self.s[here], weight, self.table[here])
-        return IntervalBatch(one, number, number, self.h[here], self.t[here])
+    def local(self, path: DiscretePath) -> Array:
+        """(x, x', x'') of q = q0 (+) x, shape (3, E, n): see IntervalBatch.local."""
+        x = np.stack(self._local(path))
+        return x if len(x) > 2 else np.append(x, np.zeros_like(x[:1]), axis=0)
 
     def _local(self, path: DiscretePath) -> tuple[Array, ...]:
         """(x, x', ..., x^(k)) of q = q0 (+) x, (E, n) each."""
@@ -184,42 +178,6 @@ class InstantBatch:
         data = scaled_data(path, self.numbers, self.h[:, None], self.modes)
         x = np.matmul(self.table, data) / powers[:, :, None]
         return tuple(np.ascontiguousarray(x[:, j]) for j in range(x.shape[1]))
-
-
-@dataclass(frozen=True, eq=False)
-class InstantCharts:
-    """The charts of the intervals of some instants, with the interface of `IntervalCharts`.
-
-    each: of one instant.
-    """
-
-    each: list[Charts]
-
-    @property
-    def turns(self) -> Array:
-        """See IntervalCharts.turns."""
-        return np.concatenate([charts.turns for charts in self.each])
-
-    def expand(self, gradient: Array, hessian: Array) -> tuple[Array, Array]:
-        """Gradient (E, m, n) and Hessian (E, m, m, n, n) in nodal columns."""
-        pairs = [c.expand(gradient[i : i + 1], hessian[i : i + 1]) for i, c in self._numbered]
-        return np.concatenate([g for g, _ in pairs]), np.concatenate([H for _, H in pairs])
-
-    def nodal_gradient(self, gradient: Array) -> Array:
-        """The gradient (E, m, n) in nodal columns."""
-        return np.concatenate([c.nodal_gradient(gradient[i : i + 1]) for i, c in self._numbered])
-
-    def end_gradient(self, gradient: Array) -> Array:
-        """As `nodal_gradient`, in the end columns only and without cancellation."""
-        return np.concatenate([c.end_gradient(gradient[i : i + 1]) for i, c in self._numbered])
-
-    def point_steps(self, step: Array) -> Array:
-        """Change of (q, v, a) at the instants in nodal steps (E, m, n)."""
-        return np.concatenate([c.point_steps(step[i : i + 1]) for i, c in self._numbered])
-
-    @property
-    def _numbered(self) -> list[tuple[int, Charts]]:
-        return list(enumerate(self.each))
 
 
 def instant_batches(

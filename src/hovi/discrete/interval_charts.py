@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.discrete.grid import DiscretePath
+from hovi.discrete.instants import InstantBatch
 from hovi.discrete.interval_batch import IntervalBatch, Jet
 from hovi.robot.space.chart import Chart
 from hovi.robot.space.compiled_charts import CompiledCharts
@@ -27,9 +28,10 @@ Array = npt.NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class IntervalCharts:
-    """The charts of some intervals of one scheme along a path.
+    """The charts of some intervals of one scheme along a path, or those of instants.
 
-    chart: of the robot. scheme: of the intervals. h: their lengths, shape (B,).
+    chart: of the robot. scheme: of the intervals; that of instants has one point, and one table, of
+    each. h: their lengths, shape (B,).
     x: (x, x', x'') at their quadrature points, shape (3, B Q, n).
     ends: (x1, h x1'), shape (B, 2, n).
     """
@@ -171,8 +173,8 @@ def jet_on(space: ConfigurationSpace, batch: IntervalBatch, path: DiscretePath) 
     return space.integrate(q0[:, None], each).reshape(-1, space.nq), *x[1 : k + 1]
 
 
-def charts_on(chart: Chart, batch: IntervalBatch, path: DiscretePath) -> Charts:
-    """The charts of a batch's intervals."""
+def charts_on(chart: Chart, batch: IntervalBatch | InstantBatch, path: DiscretePath) -> Charts:
+    """The charts of a batch's intervals, or of those of its instants."""
     h = batch.h[:, None, None]
     if batch.scheme.derivatives == 1:
         x1 = h * path.z[batch.index]  # (B, 1, n)

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses
+from typing import Any
+
 import numpy as np
 import numpy.typing as npt
 import pytest
@@ -93,9 +96,14 @@ def test_an_end_within_the_margin_is_infeasible_before_any_step(
         assert word in solution.message
 
 
-def test_a_ball_that_cannot_be_passed_is_infeasible_and_named(arm_scene: hovi.Scene) -> None:
+@pytest.mark.parametrize("limits", [None, {"base": "none", "v": 10.0}])
+def test_a_ball_that_cannot_be_passed_is_infeasible_and_named(
+    arm_scene: hovi.Scene, limits: Any
+) -> None:
     """The upper arm cannot pass it in its plane, for any motion of the forearm."""
     barred = problem(arm_scene, Sphere([0.49, 0.0, -0.41], 0.2, name="ball"))
+    if limits is not None:
+        barred = dataclasses.replace(barred, limits=as_limits(arm_scene.robot, limits))
     solution = solve_on_grid(barred)
     assert solution.status is Status.INFEASIBLE
     for word in ("'upper_arm'", "obstacle 'ball'", "overlap by", "at t ="):

@@ -160,26 +160,3 @@ def _is_pair(pair: Any) -> bool:
     """Whether something is two different names."""
     two = isinstance(pair, tuple | list) and len(pair) == 2
     return two and all(isinstance(name, str) for name in pair) and pair[0] != pair[1]
-
-
-@dataclass(frozen=True, eq=False)
-class PartOfClearance(Clearance):
-    """The clearance of some pairs of shapes only.
-
-    whole: the clearance of all pairs. numbers: of the pairs, as `distances_within_reach` lists
-    them.
-    """
-
-    whole: Clearance = Clearance()
-    numbers: tuple[int, ...] = ()
-
-    @classmethod
-    def of(cls, whole: Clearance, numbers: Sequence[int]) -> PartOfClearance:
-        """Of pairs by their numbers."""
-        fields = whole.obstacles, whole.margin, whole.self_collision, whole.may_touch
-        return cls(*fields, whole.left_out, whole.gaps, whole, tuple(int(k) for k in numbers))
-
-    @property
-    def wanted(self) -> bool:
-        """Whether there are pairs."""
-        return bool(self.numbers)

@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 import numpy.typing as npt
 
-from hovi.planning.clearance.clearance import MOST_GAP, Clearance, PartOfClearance
+from hovi.planning.clearance.clearance import MOST_GAP, Clearance
 from hovi.planning.clearance.convex_shapes import convex_geometry
 from hovi.planning.clearance.distances import Distances, distances_between
 from hovi.planning.obstacles.obstacle import Body, Obstacle
@@ -30,13 +30,10 @@ ROTARY = "revolute", "continuous", "spherical"
 def distances_within_reach(robot: Robot, clearance: Clearance) -> Distances | None:
     """The distances that a clearance bounds, without obstacles that are never near; None for none.
 
-    Numbers of a PartOfClearance are those of these distances. Raises as Distances does.
+    Raises as Distances does.
     """
     if not clearance.wanted:
         return None
-    if isinstance(clearance, PartOfClearance):
-        whole = distances_within_reach(robot, clearance.whole)
-        return None if whole is None else whole.restricted(clearance.numbers)
     every = distances_between(robot, clearance)
     reach = reach_of(robot) + float(clearance.margin) + NEVER_NEAR
     if not np.isfinite(reach):
@@ -62,8 +59,6 @@ def with_gaps(
     duration: T, in [s].
     Raises as Distances does.
     """
-    if isinstance(clearance, PartOfClearance):
-        return clearance
     distances, margin = distances_within_reach(robot, clearance), float(clearance.margin)
     if distances is None:
         return clearance

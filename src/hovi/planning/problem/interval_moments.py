@@ -8,9 +8,8 @@ from typing import Self
 import numpy as np
 import numpy.typing as npt
 
-from hovi.discrete.contraction import AnyCharts
 from hovi.discrete.interval_batch import IntervalBatch
-from hovi.discrete.interval_charts import IntervalCharts
+from hovi.discrete.interval_charts import Charts, IntervalCharts
 from hovi.schemes.polynomials import orthonormal_legendre
 from hovi.system.dataclass import dataclass
 
@@ -55,7 +54,7 @@ class IntervalMoments:
         points = values.reshape(-1, self.tests.shape[1], values.shape[1])
         return np.asarray(np.matmul(self._weighted, points))
 
-    def slopes(self, jacobian: Array, charts: AnyCharts | None = None) -> Array:
+    def slopes(self, jacobian: Array, charts: Charts | None = None) -> Array:
         """h dm_j in the nodal columns of the intervals, shape (B, K p, m, n).
 
         jacobian: of the values in (q, v, ...) at the points, shape (P, p, R n). charts: of the

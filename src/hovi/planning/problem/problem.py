@@ -287,6 +287,13 @@ class TrajectoryProblem(ProblemSummary):
             problem.__dict__.pop(name, None)
         return problem
 
+    def apart_from(self, clearance: Clearance | None = None) -> TrajectoryProblem:
+        """The same problem with another clearance, or none, sharing what was built for this one."""
+        other = copy.copy(self)  # only its finer one depends on it, too
+        object.__setattr__(other, "clearance", clearance)
+        other.__dict__.pop("finer", None)
+        return other
+
     @cached_property
     def finer(self) -> TrajectoryProblem:
         """The same problem with more inner modes, for error estimates."""

@@ -123,7 +123,8 @@ class BestDuration:
     steps: of the optimiser, in all solves. ending: words of the message before the duration.
     reason: why the search ended early; "" if it did not, or if the motion is not a minimum.
     at_edge: whether durations next to it, at which less cost is expected, are infeasible.
-    at_jump: whether J' + w changes its sign next to it, where the cost jumps on this grid.
+    steepest: slope |J' + w| that a jump of the cost next to it on this grid explains, in cost per
+        [s]; 0 for none.
     """
 
     free: FreeDuration
@@ -132,7 +133,7 @@ class BestDuration:
     ending: str
     reason: str = ""
     at_edge: bool = False
-    at_jump: bool = False
+    steepest: float = 0.0
 
     def with_time(self) -> Solution:
         """The motion as a solution whose cost includes w T, and whose message says so."""
@@ -246,7 +247,7 @@ class _Search:
         self.durations = 0
         T = float(np.clip(free.length(first), free.lower, free.upper))
         self.beyond: _Trial | None = None
-        self.ending, self.at_jump = "", False
+        self.ending, self.steepest = "", 0.0
         self._move_to(_Trial(T, first, free))
 
     def run(self) -> BestDuration:
@@ -267,8 +268,8 @@ class _Search:
         return self._best()
 
     def _best(self) -> BestDuration:
-        found, jump = self.here.solution, self.at_jump
-        return BestDuration(self.free, found, self.steps, self.ending, at_jump=jump)
+        known = self.free, self.here.solution, self.steps, self.ending
+        return BestDuration(*known, steepest=self.steepest)
 
     def _next_duration(self) -> float | None:
         """The next duration in [s]; None at a bound or at the edge of feasibility."""
@@ -348,7 +349,9 @@ class _Search:
         self.here, costlier = _sides(known, root)
         jump = (costlier.total - self.here.total) / abs(self.here.total)
         if jump <= MAX_GRID_JUMP:
-            self.here, self.at_jump = min(known.values(), key=lambda each: each.total), True
+            explained = max(jump, MIN_JUMP) * abs(self.here.total)
+            self.steepest = explained / abs(costlier.duration - self.here.duration)
+            self.here = min(known.values(), key=lambda each: each.total)
             self.ending = f"The best duration, next to a jump of the cost by {jump:.0e} of it, is"
         else:
             self.beyond = costlier

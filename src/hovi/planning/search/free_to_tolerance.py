@@ -60,8 +60,8 @@ def free_to_tolerance(
         steps += sum(done.nit for done in refined.accuracy.rounds[1:])
         settled = refined.trajectory.grid is found.solution.trajectory.grid
         ending = found.ending if refined.success else "The duration is"
-        at_jump = found.at_jump and settled  # else the jump is one of another grid
-        found = dataclasses.replace(found, solution=refined, ending=ending, at_jump=at_jump)
+        steepest = found.steepest if settled else 0.0  # else the jump is one of another grid
+        found = dataclasses.replace(found, solution=refined, ending=ending, steepest=steepest)
         kept = found if refined.accuracy.reached else kept
         if settled or not refined.success:
             break

@@ -41,9 +41,6 @@ STATIONARY_SLOPE = 1e-9
 LARGEST_SLOPE = 1e-7
 """Largest slope J' + w, relative to w, of a motion that is called a minimum, unless its duration is
 at a bound, at the edge of feasibility or next to a jump of the cost."""
-LARGEST_SLOPE_AT_JUMP = 1e-2
-"""The same next to a jump of the cost, where limits or obstacles act at other instants for other
-durations, and the best duration is known only to JUMP_BRACKET."""
 SLOPE_AMONG_OBSTACLES = 1e-5
 """The same where distances are bounded, at instants that change with the duration: a duration that
 is off by as much costs 1e-11 more."""
@@ -138,18 +135,20 @@ def best_on_its_grid(
 
 
 def is_best(found: BestDuration) -> bool:
-    """Whether J' + w vanishes, or pushes against a bound, the edge of feasibility or a jump."""
+    """Whether J' + w vanishes, or pushes against a bound, the edge of feasibility or a jump.
+
+    The cost jumps where limits or obstacles act at other instants for other durations.
+    """
     free = found.free
     slope = free.slope(found.solution)
     density = abs(action_of(found.solution)) / found.solution.trajectory.duration
     small = free.weight <= SMALL_WEIGHT * density
     unit, largest = (density, SLOPE_OF_SMALL_WEIGHT) if small else (free.weight, LARGEST_SLOPE)
-    if found.at_jump:
-        largest = LARGEST_SLOPE_AT_JUMP
     problem = found.solution.problem
     if problem is not None and problem.distances is not None:
         largest = max(largest, SLOPE_AMONG_OBSTACLES)
-    return abs(slope) <= largest * unit or found.at_edge or _ending(free, found.solution) != ""
+    steepest = max(largest * unit, found.steepest)
+    return abs(slope) <= steepest or found.at_edge or _ending(free, found.solution) != ""
 
 
 def unless_best(found: BestDuration, status: Status = Status.UNRESOLVED) -> BestDuration:

@@ -24,6 +24,7 @@ from hovi.errors import ChartError
 from hovi.planning.paths.first_guesses import FirstGuesses
 from hovi.planning.problem.notation.goal_turns import says_turns
 from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.search.continuation import UNUSABLE
 from hovi.planning.search.free_duration import FreeDuration
 from hovi.planning.search.job import Job
 from hovi.planning.solver.solver import Solution, solve_on_grid
@@ -377,10 +378,14 @@ def _random_turns(robot: Robot, seed: int) -> Array:
 
 
 def distinct(solutions: Sequence[Solution]) -> list[Solution]:
-    """Minima with different costs, ascending; the best other solution if there are none."""
+    """Minima with different costs, ascending; the best other solution if there are none.
+
+    Costs of motions that violate limits say nothing: of these the last one, which was tried since
+    the others had failed.
+    """
     minima = sorted((s for s in solutions if s.success), key=lambda s: s.cost)
     if not minima:
-        usable = [s for s in solutions if s.status is not Status.DIVERGED] or list(solutions)
+        usable = [s for s in solutions if s.status not in UNUSABLE] or list(solutions[-1:])
         return [min(usable, key=lambda s: s.cost)]
     kept = [minima[0]]
     for solution in minima[1:]:

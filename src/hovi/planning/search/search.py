@@ -111,13 +111,10 @@ class Search:
 
     def _of_whole(self, free: Solution) -> Solution | None:
         """A solution without self-collision as one with; None if links come too near in it."""
-        # Here, since a robot without collision shapes plans without these modules.
-        from hovi.planning.solver.methods.active_pairs import with_clearance
-
         clearance = self.fine.problem().clearance
         assert clearance is not None
         assert free.problem is not None
-        problem = with_clearance(on_grid_of(free.problem, free), clearance)
+        problem = on_grid_of(free.problem, free).apart_from(clearance)
         kept, near = dataclasses.replace(free, problem=problem), 0
         ended = free.status in (*STOPPED, Status.INFEASIBLE)
         if not ended and problem.distances is not None:  # there are pairs, within reach

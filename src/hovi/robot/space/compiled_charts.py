@@ -41,9 +41,10 @@ def local_rates(
 
 @dataclass(frozen=True, eq=False)
 class CompiledCharts:
-    """The chain rule in the charts of B intervals of one scheme, with m columns of n components.
+    """The chain rule in the charts of B intervals, with m columns of n components.
 
-    layout: of the configuration space. table: shape (Q, 3, m). weights: shape (Q,).
+    layout: of the configuration space. table: shape (Q, 3, m). weights: shape (Q,); of intervals
+    with tables of their own (B Q, 3, m) and (B Q,).
     h: lengths of the intervals, shape (B,). x: (x, x', x'') at the points, shape (3, B Q, n).
     ends: (x1, h x1'), shape (B, 2, n).
     """
@@ -90,7 +91,7 @@ class CompiledCharts:
     def push_steps(self, step: Array) -> Array:
         """Change of (q, v, a) at the points, (B, Q, 3, n), in a step of the columns (B, m, n)."""
         B, _, n = self._size
-        change = np.empty((B, len(self.weights), 3, n))
+        change = np.empty((B, self.x.shape[1] // max(B, 1), 3, n))
         native.push_steps(*self._arrays, np.ascontiguousarray(step), change, self.portable)
         return change
 

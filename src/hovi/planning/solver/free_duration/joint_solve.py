@@ -25,7 +25,7 @@ from hovi.planning.solver.answer import Answer
 from hovi.planning.solver.free_duration.timed_action import TimedAction
 from hovi.planning.solver.free_duration.timed_path import TimedPath, stretched_path
 from hovi.planning.solver.free_duration.timed_search import minimum_within_limits
-from hovi.planning.solver.methods.interior_point import InteriorPoint, takes_rows
+from hovi.planning.solver.methods.interior_point import InteriorPoint
 from hovi.planning.solver.methods.method import Guess
 from hovi.planning.solver.outcome.cost_with_time import price_of_time
 from hovi.planning.solver.solver import STATIONARY_DECREASE, Solution, solution_of
@@ -62,7 +62,7 @@ def solves_jointly(problem: TrajectoryProblem, clock: Clock, lengths: Array, nea
     nodes = clock.nodes(problem.grid, lengths)
     if not all(_stays(each, problem.grid, nodes) for each in equations):
         return False
-    if distances is not None and (distances.paths or not takes_rows(problem)):
+    if distances is not None and (distances.paths or problem.ld.chart is not None):
         return False
     return near or (not equations and distances is None)
 

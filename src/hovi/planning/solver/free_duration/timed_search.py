@@ -33,7 +33,6 @@ from hovi.planning.solver.methods.bounded_search import (
     BoundedSearch,
 )
 from hovi.planning.solver.methods.feasibility import solved_from
-from hovi.planning.solver.methods.interior_point import takes_rows
 from hovi.planning.solver.methods.limits_between_points import tightened, usable
 from hovi.planning.solver.methods.method import Guess
 from hovi.planning.solver.missed_equations import spurious_sentence
@@ -60,7 +59,7 @@ def minimum_within_limits(
 ) -> tuple[Answer, Array]:
     """A motion of least S + w sum L within limits, from a guess for the problem's L; and its L."""
     known = problem, limits, criteria, None, start
-    search = TimedSearch(*known, lazy=takes_rows(problem), price=price, lengths=lengths)
+    search = TimedSearch(*known, price=price, lengths=lengths)
     return answered(partial(_searched, search), partial(_ended, search)), search.lengths
 
 

@@ -50,7 +50,7 @@ def locally_infeasible(search: BoundedSearch, ended: Bounded) -> str:
     If all three find one, and two of them the lowest, that becomes the motion of the failed solve.
     """
     problem = search.problem
-    if search.clearance is not None or search.free_duration:
+    if search.free_duration:
         return ""
     rows, search.rows = search.rows, search.fine_rows()
     cost = max(abs(problem.ld.action(ended.x)), 1e-12)

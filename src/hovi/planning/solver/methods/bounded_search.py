@@ -34,7 +34,6 @@ from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.action_objective import ActionObjective, LinearAlgebra
 from hovi.planning.solver.bounded_action import BoundedAction
 from hovi.planning.solver.central_path import CentralPath
-from hovi.planning.solver.clearance_outputs import EXTRA_CLEARANCE, ClearanceOutputs
 from hovi.planning.solver.condition_outputs import ConditionOutputs
 from hovi.planning.solver.first_multipliers import first_multipliers
 from hovi.planning.solver.limits.limit_rows import LimitRows
@@ -46,9 +45,10 @@ from hovi.planning.solver.missed_equations import (
     unmet_sentence,
 )
 from hovi.planning.solver.multipliers import Multipliers
+from hovi.planning.solver.near.beyond_margin import EXTRA_CLEARANCE
 from hovi.planning.solver.near.clearance_rows import ClearanceRows
 from hovi.planning.solver.near.cleared_action import ClearedAction
-from hovi.planning.solver.point_outputs import PointOutputs, joint_outputs
+from hovi.planning.solver.point_outputs import PointOutputs
 from hovi.scene.lagrangian import PointTerms
 from hovi.system.dataclass import dataclass
 from hovi.system.deadline import Deadline, raise_if_late
@@ -81,7 +81,7 @@ class BoundedSearch:
     start: the initial guess; guess: the same on the problem's grid.
     iterations: steps of all solves.
     margins: fraction of its range by which each bound is tightened in each interval, shape
-        (2, N, kinds nv + pairs + values of conditions). clearance: bounded distances, or None.
+        (2, N, kinds nv + values of conditions).
     multipliers, unmet: of the constraints, and why they cannot be satisfied, or "".
     last: the problem and the motion of the last solve. solved: how it ended, and its objective.
     points: of the central path, with a larger barrier than that of the last solution. at_level:
@@ -100,7 +100,6 @@ class BoundedSearch:
     iterations: int = 0
     multipliers: Multipliers | None = None
     unmet: str = ""
-    lazy: bool = False
     at_level: bool = False
     lengths: Array = dataclasses.field(default_factory=lambda: np.zeros(0))
 
@@ -109,14 +108,8 @@ class BoundedSearch:
         self.guess, self.along, self.level = self.start.x, self.start.z, self.start.mu
         self.last = self.problem, self.guess
         self.history: list[Iteration] = []
-        distances = self.problem.distances
-        self.clearance: ClearanceOutputs | None = None
-        self.near: ClearanceRows | None = None
-        if distances is not None and self.lazy:
-            self.near = self.no_near_rows()
-        elif distances is not None:
-            least = self.bounded_distance, self.least_distance
-            self.clearance = ClearanceOutputs(distances, *least)
+        apart = self.problem.distances is None
+        self.near: ClearanceRows | None = None if apart else self.no_near_rows()
         self.margins = self.no_margins()
         if self.along is not None and not self.along.fits(self.problem.grid):
             self.along = None  # a round before has halved intervals
@@ -138,16 +131,16 @@ class BoundedSearch:
         return self.least_distance + EXTRA_CLEARANCE * DISTANCE_SCALE
 
     def no_margins(self) -> Array:
-        """Zero margins, shape (2, N, kinds nv + pairs + values of conditions)."""
+        """Zero margins, shape (2, N, kinds nv + values of conditions)."""
         more = self.more
         size = self.limits.lower.size + (0 if more is None else more.size)
         return np.zeros((2, self.problem.grid.intervals, size))
 
     @property
     def more(self) -> PointOutputs | None:
-        """What is bounded at the points next to limits: distances, and then conditions."""
-        conditions = ConditionOutputs(self.problem) if self.problem.bounds else None
-        return joint_outputs(self.clearance, conditions)
+        """What is bounded at the points next to limits: conditions."""
+        found = ConditionOutputs(self.problem) if self.problem.bounds else None
+        return found if found is not None and found.size > 0 else None
 
     def coarse_rows(self) -> LimitRows:
         """Limits at all times, by few control points."""

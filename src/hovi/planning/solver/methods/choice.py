@@ -18,6 +18,9 @@ def all_methods() -> Iterator[Method]:
     from hovi.planning.solver.methods.lagrange_newton import LagrangeNewton
 
     yield LagrangeNewton()
+    from hovi.planning.solver.methods.free_first import FreeFirst
+
+    yield FreeFirst()
     from hovi.planning.solver.methods.interior_point import InteriorPoint
 
     yield InteriorPoint()

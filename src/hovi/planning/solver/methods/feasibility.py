@@ -40,10 +40,10 @@ WARM_STEPS = 100
 def feasible_motion(search: BoundedSearch) -> tuple[Bounded, str]:
     """A motion from the guess within bounds at points and control points, or why there is none."""
     ended = _solved_nearby(search) or _solved_at_all(search)
-    if search.near is not None:
-        failed = ended.why is Reason.DIVERGED and not ended.feasible
-        return ended, search.worst(ended.x) if failed else ""
     failed = ended.why is Reason.DIVERGED
+    if search.near is not None:
+        missed = search.too_close(ended.x) if ended.feasible else search.worst(ended.x)
+        return ended, missed if failed else ""
     if not failed or (ended.feasible and not search.unsatisfied(ended.x)):
         return ended, ""
     reason = locally_infeasible(search, ended)
@@ -54,7 +54,7 @@ def feasible_motion(search: BoundedSearch) -> tuple[Bounded, str]:
 
 def _solved_nearby(search: BoundedSearch) -> Bounded | None:
     """The solution near a guess that is taken to be near one; None if it is not, or that fails."""
-    if not search.start.near or search.clearance is not None:
+    if not search.start.near:
         return None
     whole = search.criteria
     most, along = whole.max_iterations, search.along

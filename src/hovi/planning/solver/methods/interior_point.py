@@ -13,7 +13,6 @@ from hovi.planning.problem.contradictions import contradiction
 from hovi.planning.problem.limits import no_limits
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.answer import Answer, answered
-from hovi.planning.solver.methods.active_pairs import with_active_pairs
 from hovi.planning.solver.methods.bounded_search import BoundedSearch
 from hovi.planning.solver.methods.feasibility import feasible_motion
 from hovi.planning.solver.methods.limits_between_points import tightened, usable
@@ -28,16 +27,6 @@ from hovi.planning.solver.status import (
     saddle_in_words,
     unfinished,
 )
-
-
-def takes_rows(problem: TrajectoryProblem) -> bool:
-    """Whether distances can be bounded by rows where pairs come near.
-
-    Without limits only where links are kept apart, of which many pairs are near at once.
-    """
-    if problem.distances is None or problem.clearance is None or problem.ld.chart is not None:
-        return False
-    return problem.has_limits or problem.clearance.self_collision
 
 
 class InteriorPoint(Method):
@@ -58,29 +47,13 @@ class InteriorPoint(Method):
         criteria: Criteria,
         report: Report | None = None,
     ) -> Answer:
-        """See Method.minimize; intervals may be split.
-
-        With rows for distances where pairs come near; in rounds where that is not supported.
-        """
-        if takes_rows(problem):
-            return self._minimize(problem, start, criteria, report, lazy=True)
-        solve = partial(self._minimize, report=report)
-        return with_active_pairs(solve, problem, start, criteria, report)
-
-    def _minimize(
-        self,
-        problem: TrajectoryProblem,
-        start: Guess,
-        criteria: Criteria,
-        report: Report | None,
-        lazy: bool = False,
-    ) -> Answer:
+        """See Method.minimize; intervals may be split."""
         limits = problem.limits or no_limits(problem.coordinates)
         reason = contradiction(problem, limits)
         if reason:
             said = infeasible_sentence(reason)
             return Answer.at(problem, start.x, Status.INFEASIBLE, said)
-        search = BoundedSearch(problem, limits, criteria, report, start, lazy=lazy)
+        search = BoundedSearch(problem, limits, criteria, report, start)
         return answered(partial(_searched, search), partial(_ended, search))
 
 

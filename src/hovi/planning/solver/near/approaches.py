@@ -13,7 +13,7 @@ from hovi.planning.clearance.clearance_violation import wanted_values
 from hovi.planning.clearance.distances import Distances
 from hovi.planning.clearance.fast_obstacles import FastPairs
 from hovi.planning.problem.problem import TrajectoryProblem
-from hovi.planning.solver.clearance_outputs import EXTRA_CLEARANCE
+from hovi.planning.solver.near.beyond_margin import EXTRA_CLEARANCE
 from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
@@ -75,7 +75,7 @@ class Approaches:
 
 
 def configurations(problem: TrajectoryProblem, path: DiscretePath, batch: InstantBatch) -> Array:
-    """q at instants, (M, nq), on vector spaces and commutative groups."""
+    """q at instants, (M, nq)."""
     q, x = path.q[batch.numbers], batch.displacements(path)
     coordinates = problem.coordinates
     if coordinates.vector_joints:  # several times in every step, so without checks of shapes

@@ -17,10 +17,10 @@ import numpy.typing as npt
 from hovi.discrete.grid import DiscretePath
 from hovi.discrete.instants import InstantBatch, Instants
 from hovi.discrete.interval_batch import Coordinates
+from hovi.discrete.interval_charts import charts_on
 from hovi.planning.clearance.clearance import DISTANCE_SCALE
 from hovi.planning.clearance.distances import Distances
 from hovi.planning.problem.problem import TrajectoryProblem
-from hovi.planning.solver.clearance_outputs import CUTOFF, saturated
 from hovi.planning.solver.limits.limit_rows import LimitRows
 from hovi.planning.solver.near.approaches import (
     SPREAD,
@@ -31,6 +31,7 @@ from hovi.planning.solver.near.approaches import (
     spread,
     spread_approaches,
 )
+from hovi.planning.solver.near.beyond_margin import CUTOFF, saturated
 from hovi.planning.solver.near.expanded_rows import ExpandedRows, RowSums
 from hovi.planning.solver.near.recent_paths import RecentPaths
 from hovi.scene.lagrangian import PointTerms, over_time
@@ -55,7 +56,9 @@ GUARD = 0.05
 class ClearanceRows:
     """Rows y >= 0 of pairs at instants: what their distances exceed the least one by.
 
-    They are as `ClearanceOutputs` measures them. None at first; `extend` adds some.
+    y = (phi(d) - least) / DISTANCE_SCALE with the pair's distance d. phi(d) = d for near pairs and
+    constant for far ones, with two continuous derivatives: far pairs have no influence, and need no
+    derivatives. None at first; `extend` adds some.
 
     problem: with the grid and the ends. distances: of all pairs. least: lower bound, in [m].
     intervals, positions, pairs, rounding: of each row, shape (E,): its interval, where it is in it,
@@ -162,8 +165,10 @@ class ClearanceRows:
         if bend.any():
             bent = ((force * bend)[:, None] * J)[:, :, None] * J[:, None]
             curvature = curvature + sums.by_instant(bent)
-        table = np.ascontiguousarray(self._batch.tables[coordinates][:, 0])
-        return ExpandedRows(sums, table, slope[:, None] * J, curvature)
+        table, chart = self._batch.tables[coordinates][:, 0], self._problem.ld.chart
+        charts = None if chart is None else charts_on(chart, self._batch, path)
+        common = sums, np.ascontiguousarray(table), slope[:, None] * J, curvature
+        return ExpandedRows(*common, charts, self.grid.order)
 
     def forces(self, path: DiscretePath, multipliers: Array) -> tuple[Instants, list[PointTerms]]:
         """The multipliers of the rows, (E,), as forces on q at their instants, one batch."""

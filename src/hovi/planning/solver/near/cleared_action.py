@@ -121,7 +121,7 @@ class ClearedAction(BoundedAction):
         other = None if near is None else near.without_negative_curvature()
         if near is None or other is None:
             return None
-        other.add_at_instants(other.curvature - near.curvature, self.action.expansion.hessian)
+        other.add_curvature(near.curvature, self.action.expansion.hessian)
         self._near = other
         return self._under_equations(x, self.action.model_of_expansion())
 
@@ -137,7 +137,7 @@ class ClearedAction(BoundedAction):
             if limits is not None:
                 limits(expansion)
             near.pull(slopes, expansion.gradient)
-            near.add_squares(curves, expansion.hessian)
+            near.add_squares(slopes, curves, expansion.hessian)
 
         return add
 

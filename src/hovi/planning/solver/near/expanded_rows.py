@@ -7,6 +7,7 @@ import dataclasses
 import numpy as np
 import numpy.typing as npt
 
+from hovi.discrete.interval_charts import Charts
 from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
@@ -56,12 +57,16 @@ class ExpandedRows:
     sums: over the rows. table: of the configurations at the instants over the columns of their
     intervals, (M, m). jacobian: of the rows in these configurations, (E, nv). curvature: sum of
     force y'' at the instants, (M, nv, nv).
+    charts: of the instants' intervals, in place of the table; None where they are identities.
+    order: k of (q, q', ..., q^(k)), which charts move.
     """
 
     sums: RowSums
     table: Array
     jacobian: Array
     curvature: Array
+    charts: Charts | None = None
+    order: int = 2
 
     def without_negative_curvature(self) -> ExpandedRows | None:
         """The same with the positive part of the curvature at every instant.
@@ -78,23 +83,57 @@ class ExpandedRows:
 
     def push(self, columns: Array) -> Array:
         """The change of y in a step of the intervals' columns (N, m, n), shape (E,)."""
-        dq = np.matmul(self.table[:, None], columns[self.sums.intervals])[:, 0]
+        step = columns[self.sums.intervals]
+        if self.charts is not None:
+            dq = self.charts.point_steps(step)[:, 0, 0]
+        else:
+            dq = np.matmul(self.table[:, None], step)[:, 0]
         return np.asarray(np.vecdot(self.jacobian, dq[self.sums.instant]))
 
     def pull(self, forces: Array, gradient: Array) -> None:
         """Add the forces on rows, (E,), to a covector in the intervals' columns, (N, m, n)."""
-        at = self.sums.by_instant(forces[:, None] * self.jacobian)
-        gradient[self.sums.numbers] += self.sums.by_interval(self.table[:, :, None] * at[:, None])
+        at = self._at_instants(forces)
+        if self.charts is not None:
+            pulled = self.charts.nodal_gradient(self._jets(at))
+        else:
+            pulled = self.table[:, :, None] * at[:, None]
+        gradient[self.sums.numbers] += self.sums.by_interval(pulled)
 
-    def add_squares(self, weights: Array, hessian: Array) -> None:
-        """Add the weighted squares of rows' changes, and the curvature, to (N, m, m, n, n)."""
+    def add_squares(self, forces: Array, weights: Array, hessian: Array) -> None:
+        """Add the weighted squares of rows' changes, and the curvature, to (N, m, m, n, n).
+
+        In charts, that of the configurations with the forces on rows, (E,), as well.
+        """
         J = self.jacobian
         squares = (weights[:, None] * J)[:, :, None] * J[:, None]
-        self.add_at_instants(self.sums.by_instant(squares) + self.curvature, hessian)
+        at = self.sums.by_instant(squares) + self.curvature
+        self._add_at_instants(self._at_instants(forces), at, hessian)
 
-    def add_at_instants(self, at: Array, hessian: Array) -> None:
-        """Add second derivatives at the instants, (M, nv, nv), to the intervals' Hessians."""
+    def add_curvature(self, less: Array, hessian: Array) -> None:
+        """Add the curvature, less another one, (M, nv, nv), to the intervals' Hessians."""
+        none = np.zeros(self.curvature.shape[:2])
+        self._add_at_instants(none, self.curvature - less, hessian)
+
+    def _at_instants(self, forces: Array) -> Array:
+        """The forces on rows as those on the configurations, (M, nv)."""
+        return self.sums.by_instant(forces[:, None] * self.jacobian)
+
+    def _jets(self, at: Array) -> Array:
+        """Covectors of configurations, (M, nv), as those of (q, v, ...), (M, k + 1, nv)."""
+        whole = np.zeros((len(at), self.order + 1, at.shape[1]))
+        whole[:, 0] = at
+        return whole
+
+    def _add_at_instants(self, slopes: Array, at: Array, hessian: Array) -> None:
+        """Add derivatives at the instants, (M, nv) and (M, nv, nv), to the intervals' Hessians."""
         T, n = self.table, self.jacobian.shape[1]
+        if self.charts is not None:
+            size = (self.order + 1) * n
+            whole = np.zeros((len(at), size, size))
+            whole[:, :n, :n] = at
+            _, found = self.charts.expand(self._jets(slopes), whole)
+            hessian[self.sums.numbers] += self.sums.by_interval(found)
+            return
         both = (T[:, :, None] * T[:, None]).reshape(len(T), -1)
         ends = [*self.sums.begin[1:].tolist(), len(T)]
         for k, first, end in zip(self.sums.numbers, self.sums.begin, ends, strict=True):

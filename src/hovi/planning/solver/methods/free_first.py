@@ -1,0 +1,75 @@
+"""Motions that distances alone limit: solved without them, until it is seen whether they matter."""
+
+from __future__ import annotations
+
+import dataclasses
+
+from hovi.optimize.criteria import Criteria
+from hovi.optimize.ended import Reason
+from hovi.planning.clearance.clearance_violation import near_pairs
+from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.solver.answer import Answer
+from hovi.planning.solver.methods.interior_point import InteriorPoint
+from hovi.planning.solver.methods.lagrange_newton import LagrangeNewton
+from hovi.planning.solver.methods.method import Guess, Method, Report
+from hovi.planning.solver.methods.trust_region import TrustRegion
+from hovi.planning.solver.status import Status, unfinished
+from hovi.system.deadline import Deadline, OutOfTimeError
+from hovi.system.interruption import record_interrupt
+
+WITHOUT_LIMITS: tuple[Method, ...] = (TrustRegion(), LagrangeNewton())
+"""Methods for problems without limits."""
+
+
+class FreeFirst(Method):
+    """The method without limits; the one within limits where pairs come too close in its motion."""
+
+    def supports(self, problem: TrajectoryProblem) -> bool:
+        """Problems with distances, and without other limits."""
+        return problem.distances is not None and not problem.apart_from().limited
+
+    def minimize(
+        self,
+        problem: TrajectoryProblem,
+        start: Guess,
+        criteria: Criteria,
+        report: Report | None = None,
+    ) -> Answer:
+        """See Method.minimize."""
+        deadline, free = Deadline(criteria.time_limit), problem.apart_from()
+        method = next(method for method in WITHOUT_LIMITS if method.supports(free))
+        found = method.minimize(free, start, criteria, report)
+        found = dataclasses.replace(found, problem=problem)
+        if found.status not in (Status.MINIMUM, Status.SADDLE):
+            return found
+        try:
+            with deadline.in_force():
+                apart = _keeps_distances(found)
+        except KeyboardInterrupt:
+            record_interrupt()
+            return _unchecked(found, Reason.INTERRUPTED)
+        except OutOfTimeError:
+            return _unchecked(found, Reason.TIME_LIMIT)
+        if apart:
+            return found
+        left = dataclasses.replace(criteria, time_limit=deadline.seconds_left)
+        return InteriorPoint().minimize(problem, start, left, report).after(found)
+
+
+def _keeps_distances(found: Answer) -> bool:
+    """Whether no pair comes nearer than the margin."""
+    problem = found.problem
+    assert problem.distances is not None
+    assert problem.clearance is not None
+    motion = problem.trajectory(found.path)
+    return len(near_pairs(motion, problem.distances, float(problem.clearance.margin))) == 0
+
+
+def _unchecked(found: Answer, why: Reason) -> Answer:
+    """A motion whose distances were not checked to the end."""
+    status, reason = unfinished(why)
+    message = (
+        f"{reason} after {found.nit} steps, before the distances along the motion were checked; "
+        f"the motion has the cost {found.cost:.10g}."
+    )
+    return dataclasses.replace(found, status=status, message=message)
