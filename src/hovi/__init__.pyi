@@ -83,6 +83,7 @@ from .planning.sequence.segment import Segment as Segment
 from .planning.sequence.sequence_planner import plan_sequence as plan_sequence
 from .planning.solver.outcome.limit_margins import LimitMargins as LimitMargins
 from .planning.solver.outcome.margins import Margins as Margins
+from .planning.solver.outcome.solution_factor import SolutionFactor as SolutionFactor
 from .planning.solver.solver import Solution as Solution
 from .planning.solver.status import Status as Status
 from .planning.task_file.reading import load_task as load_task

@@ -54,7 +54,8 @@ class ConstraintRows:
     @cached_property
     def flat(self) -> Array:
         """The slopes with one column per component, shape (B, E, m n)."""
-        return self.slopes.reshape(*self.slopes.shape[:2], -1)
+        intervals, rows, m, n = self.slopes.shape
+        return self.slopes.reshape(intervals, rows, m * n)
 
     def weighted(self, y: Array) -> Array:
         """A^T y in the columns of the intervals, shape (B, m, n)."""
@@ -283,7 +284,7 @@ class KktModel:
     @cached_property
     def normal_scale(self) -> float:
         """Magnitude of A^T A relative to D."""
-        return self._largest_slope**2 / float(np.max(np.abs(self.metric), initial=1e-300))
+        return self.largest_slope**2 / float(np.max(np.abs(self.metric), initial=1e-300))
 
     @property
     def curvature_scale(self) -> float:
@@ -291,7 +292,8 @@ class KktModel:
         return self.plain.curvature_scale()
 
     @cached_property
-    def _largest_slope(self) -> float:
+    def largest_slope(self) -> float:
+        """The largest entry of A."""
         return max(float(np.max(np.abs(each.slopes), initial=0.0)) for each in self.rows)
 
     @cached_property
@@ -316,7 +318,7 @@ class KktModel:
         delta: as a part of the system to solve; a small one, which refinement removes, if None.
         """
         factor = (
-            self._without_delta(shift)
+            self.exact_factor(shift)
             if delta is None
             else self._factored(self._matrix, shift, delta)
         )
@@ -329,8 +331,8 @@ class KktModel:
         small = DELTA * self._scale
         return self._factored(self._rows_alone, damping, small, small)
 
-    def _without_delta(self, shift: float, delta: float = DELTA) -> KktFactor:
-        """The factor for solutions from which refinement removes delta |A|^2 / |H|."""
+    def exact_factor(self, shift: float = 0.0, delta: float = DELTA) -> KktFactor:
+        """The factor of any inertia; refinement removes delta |A|^2 / |H| from its solutions."""
         small = delta * self._scale
         return self._factored(self._regular, shift, small, small, 1.0 / self._scale)
 
@@ -354,28 +356,35 @@ class KktModel:
         border: further columns B of H, (size, p), and their corner C, of unknowns that are in no
             equation.
         """
-        factors = [self._without_delta(0.0, d * DELTA) for d in (1.0, 1e-2)]
+        factors = [self.exact_factor(0.0, d * DELTA) for d in (1.0, 1e-2)]
         counts = {factor.negative + _negative_pivots(factor, border) for factor in factors}
         return -1 if len(counts) > 1 else max(counts.pop() - self.equations, -1)
 
     def jacobian_product(self, s: Array) -> Array:
         """A s."""
-        columns = self.plain.gather(s)
+        return self.pushed_columns(self.plain.gather(s))
+
+    def pushed_columns(self, columns: Array) -> Array:
+        """A s for a step in the columns of the intervals, (N, m, n)."""
         parts = []
         for rows in self.rows:
             own = columns[rows.index, : rows.slopes.shape[2]]
-            parts.append(np.matmul(rows.flat, own.reshape(len(own), -1, 1)).ravel())
+            parts.append(np.matmul(rows.flat, own.reshape(*rows.flat.shape[::2], 1)).ravel())
         return np.concatenate(parts)
 
     def transposed_product(self, y: Array) -> Array:
         """A^T y."""
+        return self.plain.scatter(self.pulled_columns(y))
+
+    def pulled_columns(self, y: Array) -> Array:
+        """A^T y in the columns of the intervals, (N, m, n)."""
         columns = np.zeros(self.plain.intervals.gradient.shape)
         first = 0
         for rows in self.rows:
             last = first + rows.size
             columns[rows.index, : rows.slopes.shape[2]] += rows.weighted(y[first:last])
             first = last
-        return self.plain.scatter(columns)
+        return columns
 
     def curvature(self, s: Array) -> float:
         """s.H s."""

@@ -27,6 +27,7 @@ from hovi.system.interruption import record_interrupt
 
 if TYPE_CHECKING:
     from hovi.planning.solver.central_path import CentralPath
+    from hovi.planning.solver.outcome.solution_factor import SolvedBounds
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,6 +45,7 @@ class Answer:
     jets: (q, v, a) of the path at the quadrature points, if they were computed.
     model: the quadratic model of the last step of a solve without bounds or equations.
     central: the path of a barrier method towards the motion, for warm starts.
+    ended: where a solve within limits ended; None for others.
     """
 
     problem: TrajectoryProblem
@@ -59,6 +61,7 @@ class Answer:
     jets: list[Jet] | None = None
     model: QuadraticModel | None = None
     central: CentralPath | None = None
+    ended: SolvedBounds | None = None
 
     @classmethod
     def at(

@@ -390,6 +390,12 @@ class BoundedAction(BoundedObjective[DiscretePath]):
         """The path moved by a step."""
         return self.action.retract(x, step, model)
 
+    def with_fixed_rows(self) -> Self:
+        """The same, whose rows stay as they are."""
+        other = copy.copy(self)
+        other.rows = None if self.rows is None else self.rows.fixed_on(self.rows.grid)
+        return other
+
     def stretched(self, problem: TrajectoryProblem) -> Self:
         """The same bounded action for another duration of its problem, without a model yet.
 

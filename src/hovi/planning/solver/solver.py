@@ -66,6 +66,7 @@ from hovi.system.interruption import interruptible
 
 if TYPE_CHECKING:
     from hovi.planning.solver.central_path import CentralPath
+    from hovi.planning.solver.outcome.solution_factor import SolutionFactor, SolvedBounds
     from hovi.planning.solver.receding.shift import Shift
 
 Array = npt.NDArray[np.float64]
@@ -97,6 +98,7 @@ class Solution(SolutionSummary):
     forces: multipliers of limits and of passive joints' torques at the quadrature points, and of
         limits at instants between them. instants: these; None for none.
     central, model: what `replan` starts from, the path of a barrier method or the last model.
+    ended: where a solve within limits ended, from which `factor` follows; None for others.
     check: returns a replanned motion with its error estimate or as UNRESOLVED; None for no check.
     """
 
@@ -118,6 +120,7 @@ class Solution(SolutionSummary):
     instants: Instants | None = field(default=None, repr=False)
     central: CentralPath | None = field(default=None, repr=False)
     model: QuadraticModel | None = field(default=None, repr=False)
+    ended: SolvedBounds | None = field(default=None, repr=False)
     check: Check | None = field(default=None, repr=False)
 
     @cached_property
@@ -133,6 +136,23 @@ class Solution(SolutionSummary):
     def save(self, path: str | os.PathLike[str] | io.BytesIO, *, meshes: bool = True) -> None:
         """Write the motion to one npz file, which hovi.Trajectory.load reads: see its `save`."""
         self.trajectory.save(path, meshes=meshes)
+
+    @cached_property
+    def factor(self) -> SolutionFactor:
+        """The KKT system at the motion, factored: how it follows its ends, and n_neg.
+
+        Of a minimum, or of a stationary point without limits; active limits count as equations.
+        One within limits that another process found is solved for once more, from itself.
+        Raises InputError without a problem, within limits for a motion that is no minimum, and for
+        more than 1,000 intervals.
+        """
+        # Here, since most solutions are used without it.
+        from hovi.planning.solver.outcome.solution_factor import SolutionFactor
+
+        known, problem = self, self._solved_problem
+        if self.ended is None and problem.limited and self.status is Status.MINIMUM:
+            known = self.replan()
+        return SolutionFactor.of(problem, known.trajectory.path, known.ended)
 
     @cached_property
     def duration_derivative(self) -> float:
@@ -422,6 +442,7 @@ def solution_of(result: Answer, setup_seconds: float = 0.0, solve_seconds: float
         instants=result.instants,
         central=result.central,
         model=result.model,
+        ended=result.ended,
     )
 
 

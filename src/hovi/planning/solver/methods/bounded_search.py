@@ -48,6 +48,7 @@ from hovi.planning.solver.multipliers import Multipliers
 from hovi.planning.solver.near.beyond_margin import EXTRA_CLEARANCE
 from hovi.planning.solver.near.clearance_rows import ClearanceRows
 from hovi.planning.solver.near.cleared_action import ClearedAction
+from hovi.planning.solver.outcome.solution_factor import SolvedBounds
 from hovi.planning.solver.point_outputs import PointOutputs
 from hovi.scene.lagrangian import PointTerms
 from hovi.system.dataclass import dataclass
@@ -201,6 +202,12 @@ class BoundedSearch:
         known = None if len(self.problem.passive) > 0 else self.multipliers
         conditions = None if known is None else tuple(known.conditions)
         return CentralPath(points, self.rows, barrier, self.near, conditions)
+
+    def solved_bounds(self, ended: Bounded) -> SolvedBounds | None:
+        """Where a solve ended, with its objective; None if it was not the last one."""
+        if self.solved is None or self.solved[0] is not ended:
+            return None
+        return SolvedBounds(self.solved[1], ended.z)
 
     def _add_points(self, ended: Bounded, objective: BoundedAction) -> None:
         """Add the points at which the barrier of a solve was larger to those of earlier solves.

@@ -83,11 +83,11 @@ def _searched(search: BoundedSearch) -> Answer:
     instants, forces = None, None
     if ended.why not in (*STOPPED, Reason.DIVERGED):  # or rows may be of a later attempt
         instants, forces = search.forces(ended)
-    history, central = search.history, None
+    history, central, solved = search.history, None, None
     if status is Status.MINIMUM:
-        central = search.central_path(ended)
+        central, solved = search.central_path(ended), search.solved_bounds(ended)
     counted = value, status, message, nit, n_neg, history
-    return Answer(problem, x, *counted, forces, instants, central=central)
+    return Answer(problem, x, *counted, forces, instants, central=central, ended=solved)
 
 
 def _ended(search: BoundedSearch, why: Reason) -> Answer:

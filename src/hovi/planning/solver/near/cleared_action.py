@@ -191,6 +191,17 @@ class ClearedAction(BoundedAction):
         none = np.zeros(0, dtype=np.intp)
         return self._renumbered(order, before, np.arange(before), none, added)
 
+    def with_fixed_rows(self) -> Self:
+        """See BoundedAction.with_fixed_rows."""
+        other = super().with_fixed_rows()
+        assert other.rows is not None
+        order = self.near.order
+        other.near = self.near.copied(fixed=True)
+        other.near.stand_behind(other.rows)
+        other.near.order = order
+        other._limit_outputs = RecentPaths()
+        return other
+
     def stretched(self, problem: TrajectoryProblem) -> Self:
         """See BoundedAction.stretched: rows of distances stay where they are on their intervals."""
         other = super().stretched(problem)
