@@ -55,7 +55,7 @@ def test_a_switch_replaces_and_counts_and_leaves_the_function_as_it_was(
 ) -> None:
     switches, _ = scripts
     where = "hovi.optimize.quadratic_model:next_radius"
-    edit = switches.Edit(where, "max(0.25, fraction)", "0.25")
+    edit = switches.Edit(where, "max(LEAST_SHRINKAGE, fraction)", "0.25")
     held = quadratic_model.next_radius  # whoever holds it calls the other code
     assert held(1.0, 1.0, 0.2) == 0.5
     with switches.replaced([edit]):

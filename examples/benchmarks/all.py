@@ -52,6 +52,7 @@ LONG = {
     "tasks": ("tasks.py", *PEER),
     "receding_noise": ("receding_noise.py",),
     "rules": ("rules.py", "--full"),
+    "numbers": ("steering_numbers.py",),
     "kkt_factors": ("kkt_factors.py",),
     "self_collision": ("self_collision.py", "--count", "12"),
     "hard_cases_long": ("hard_cases.py", "long"),

@@ -108,8 +108,8 @@ _rule(
     "small shift at first",
     "A search that began with a shift goes on from a smaller one after a failed factorisation.",
     "_ShiftSearch.after_failure",
-    "1e-5 if self.reached else 0.03",
-    "0.03",
+    "NEAR_SHIFT if self.reached else FAR_SHIFT",
+    "FAR_SHIFT",
 )
 _rule(
     "hard case",
@@ -135,21 +135,21 @@ _rule(
     "parabola after a failure",
     "After a refused step the radius is that of the least value of a parabola along it.",
     "next_radius",
-    "max(0.25, fraction)",
-    "0.25",
+    "max(LEAST_SHRINKAGE, fraction)",
+    "LEAST_SHRINKAGE",
 )
 _rule(
     "two ways to grow",
     "The radius grows by 1.4 instead of 2 where the model was only fairly good.",
     "next_radius",
-    "2.0 if ratio > 0.9 else 1.4",
+    "2.0 if ratio > BEST_RATIO else SMALL_GROWTH",
     "2.0",
 )
 _rule(
     "rounding counts as agreement",
     "Decreases that are rounding, actual and predicted, count as a good step.",
     "decrease_ratio",
-    "abs(actual) <= noise and abs(predicted) <= 10 * noise",
+    "abs(actual) <= noise and abs(predicted) <= PREDICTED_NOISE * noise",
     "False",
 )
 _at("trust region", "planning.solver.action_objective")
@@ -208,14 +208,14 @@ _rule(
     "shorter shares",
     "A shorter part of a step is taken where that predicts more.",
     "BoundedSteps._shortened",
-    "abs(predicted) <= 10 * self.noise or (pulled is not None and predicted > 0)",
+    "abs(predicted) <= PREDICTED_NOISE * self.noise or (pulled is not None and predicted > 0)",
     "True",
 )
 _rule(
     "radius grows fourfold",
     "Among obstacles the radius grows by four where the model predicted the decrease to 5 %.",
     "BoundedSteps.radius_after",
-    "alike and reopens and length > 0.7 * last",
+    "alike and reopens and length > AT_RADIUS * last",
     "False",
 )
 _rule(

@@ -20,9 +20,14 @@ INITIAL_MARGIN = 1e-2
 MOST_MARGIN = 0.25
 """The largest margin, as a fraction of the distance of the bounds."""
 WARM_START_MARGIN = 1e-5
-"""Minimum distance of the slack of a warm start, unless it says otherwise."""
+"""Minimum distance of the slack of a warm start from its bounds, relative to the range, unless the
+start says otherwise."""
 ADDED_MARGIN = 0.3
 """Minimum distance of a slack that is added, relative to mu over the scale of the multipliers."""
+LEAST_ADDED_MARGIN = 1e-10
+"""Least minimum distance of a slack that is added, relative to the range."""
+SCALE_PER_MU = 10.0
+"""Scale of the multipliers where none is given, relative to mu."""
 LEAST_GAP = 1e-16
 """Least distance of a slack from its bounds."""
 MAX_DUAL_RATIO = 1e8
@@ -30,8 +35,11 @@ MAX_DUAL_RATIO = 1e8
 FRACTION_TO_BOUNDARY = 0.99
 """Largest fraction of the distance to a bound in one step while mu is large."""
 LARGEST_FRACTION = 1.0 - 1e-4
-"""The same when mu is small: a slack nearer to its bound than mu over its multiplier takes a gap
-below rounding errors."""
+"""Largest fraction of the distance to a bound in one step when mu is small: a slack nearer to its
+bound than mu over its multiplier takes a gap below rounding errors."""
+CENTERED_FACTOR, CENTERED_TERM = 1.08, 0.18
+"""Centered targets are those for longer fractions of a direction: the present ones times the first
+number, plus the second one, and at most 1."""
 SLACK_MATCHED = 1e-9
 """Largest |y - s| at which the slack has reached its output and limits the length of a step."""
 
@@ -52,7 +60,7 @@ class Bounds:
 
     def shrunk(self, room: float) -> Bounds:
         """Bounds that are further inside, by at most a quarter of their distance."""
-        inside = np.minimum(room, 0.25 * (self.upper - self.lower))
+        inside = np.minimum(room, MOST_MARGIN * (self.upper - self.lower))
         return dataclasses.replace(self, lower=self.lower + inside, upper=self.upper - inside)
 
     @property
@@ -111,8 +119,8 @@ class Barrier:
     ) -> Barrier:
         """Slacks at y, clipped to a margin inside the bounds; multipliers on the central path.
 
-        scale: 10 mu if None. margin: relative to the range. known: of a nearby solution, whose
-        multipliers are kept where they are larger, for a warm start; its scale is kept, too.
+        scale: SCALE_PER_MU mu if None. margin: relative to the range. known: of a nearby solution,
+        whose multipliers are kept where they are larger, for a warm start; its scale is kept, too.
         """
         inside = np.minimum(margin, MOST_MARGIN * (bounds.upper - bounds.lower))
         s = np.clip(y, bounds.lower + inside, bounds.upper - inside)
@@ -120,7 +128,7 @@ class Barrier:
         zl, zu = mu / below, mu / above
         if known is not None:
             zl, zu, scale = np.maximum(known.zl, zl), np.maximum(known.zu, zu), known.scale
-        return cls(bounds, s, zl, zu, mu, 10.0 * mu if scale is None else scale)._clipped()
+        return cls(bounds, s, zl, zu, mu, SCALE_PER_MU * mu if scale is None else scale)._clipped()
 
     @classmethod
     def inactive(cls, bounds: Bounds, y: Array) -> Barrier:
@@ -139,7 +147,8 @@ class Barrier:
         y: all outputs, (R,). before: those that are kept, as they were.
         """
         old, known = len(kept), origin >= 0
-        margin = float(np.clip(ADDED_MARGIN * self.mu / self.scale, 1e-10, INITIAL_MARGIN))
+        margin = ADDED_MARGIN * self.mu / self.scale
+        margin = float(np.clip(margin, LEAST_ADDED_MARGIN, INITIAL_MARGIN))
         inside = np.where(np.arange(len(y)) >= old, margin, 0.0)
         s = np.append(self.s[kept] + self._moved_inside(y[:old] - before, kept), y[old:])
         whole = Barrier.central(bounds, s, self.mu, self.scale, inside)
@@ -224,7 +233,8 @@ class Barrier:
     def centered_targets(self, y: Array, of: Direction, mu: float, targets: Pair) -> Pair:
         """Targets that bring outliers among the products nearer to mu, for longer fractions."""
         lower, upper = targets[0].copy(), targets[1].copy()
-        primal, dual = (min(1.0, 1.08 * fraction + 0.18) for fraction in (of.primal, of.dual))
+        fractions = (CENTERED_FACTOR * each + CENTERED_TERM for each in (of.primal, of.dual))
+        primal, dual = (min(1.0, each) for each in fractions)
         d = (of.ds, of.dzl, of.dzu)
         native.center(*self.arrays, y, *d, primal, dual, mu, SLACK_MATCHED, lower, upper)
         return lower, upper

@@ -17,12 +17,16 @@ System = Callable[[Array], tuple[Array, Array]]
 
 CONVERGED_STEP = 1e-9
 """Relative step after which the error, about its square, is below rounding."""
+SLOW_RATIO = 0.6
+"""Ratio of successive steps above which convergence is slow."""
 STAGNATION_STEP = 1e-6
 """Relative step below which slow convergence is due to rounding; a double root would halve it."""
 SEARCHED_STEP = 1e-3
 """Relative step above which the residual must fall; shorter ones converge on their own."""
 SHORTEST = 2.0**-12
 """Part of a Newton step at which the search along it gives up."""
+LEAST_FALL = 0.25
+"""Least decrease of the residual, relative to the part of a Newton step that is taken."""
 MAX_STEPS = 60
 """Maximum number of Newton steps."""
 
@@ -75,7 +79,7 @@ def roots(system: System, u: Array) -> Roots:
         change = size / np.abs(u).max(axis=1, initial=1.0)
         residual = np.where(lost, np.where(np.isfinite(last), last, np.inf), change)
         settled = ~lost & (
-            (change <= CONVERGED_STEP) | ((change < STAGNATION_STEP) & (change > 0.6 * last))
+            (change <= CONVERGED_STEP) | ((change < STAGNATION_STEP) & (change > SLOW_RATIO * last))
         )
         if (settled | lost).all():
             return Roots(u, settled, residual)
@@ -110,7 +114,7 @@ def _search(
 
 def _fallen(matrix: Array, F: Array, size: Array, part: float) -> Flags:
     """Whether the simplified Newton step is shorter than the step that led here."""
-    return np.asarray(np.linalg.norm(_solve(matrix, F), axis=1) <= (1 - part / 4) * size)
+    return np.asarray(np.linalg.norm(_solve(matrix, F), axis=1) <= (1 - LEAST_FALL * part) * size)
 
 
 def _solve(J: Array, F: Array) -> Array:

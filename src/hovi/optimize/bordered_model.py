@@ -22,6 +22,9 @@ from hovi.system.dataclass import dataclass
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
 
+LEAST_SQUARES_TOLERANCE, MAX_LEAST_SQUARES_STEPS = 1e-14, 100
+"""Relative tolerance and maximum number of steps of the bounded least squares problem of t."""
+
 
 @dataclass(frozen=True, eq=False)
 class Border:
@@ -173,7 +176,14 @@ def least_within(pivot: Array, slope: Array, low: Array, high: Array) -> Array:
 
     upper = np.linalg.cholesky(pivot).T
     target = np.linalg.solve(upper.T, -slope)
-    found = lsq_linear(upper, target, (low, high), method="bvls", tol=1e-14, max_iter=100)
+    found = lsq_linear(
+        upper,
+        target,
+        (low, high),
+        method="bvls",
+        tol=LEAST_SQUARES_TOLERANCE,
+        max_iter=MAX_LEAST_SQUARES_STEPS,
+    )
     return np.asarray(np.clip(found.x, low, high))
 
 

@@ -15,7 +15,13 @@ from hovi.optimize.barrier import Barrier, Direction, Pair
 from hovi.optimize.bounded_objective import BoundedObjective
 from hovi.optimize.criteria import Criteria
 from hovi.optimize.ended import Ended
-from hovi.optimize.quadratic_model import QuadraticModel, next_radius
+from hovi.optimize.quadratic_model import (
+    ACCEPTED_RATIO,
+    AT_RADIUS,
+    PREDICTED_NOISE,
+    QuadraticModel,
+    next_radius,
+)
 from hovi.optimize.trust_region import Trial, solve_subproblem
 from hovi.system.dataclass import dataclass
 
@@ -26,6 +32,13 @@ LEAST_CENTRING = 1e-3
 """Smallest ratio of mu in one step."""
 CORRECTIONS = 3
 """Maximum number of corrections of outliers in one step."""
+LEAST_GAIN = 1e-3
+"""Increase of the sum of the fractions of a direction below which the last correction is
+dropped."""
+LAST_MU = 1.01
+"""Ratio of a barrier parameter to the last one up to which it counts as the last one."""
+PENALTY_RATIO = 1.2
+"""Penalty of |y - s| in the merit function, relative to the largest force of a direction."""
 MAX_STRETCH = 1.5
 """Largest length of a corrected step, relative to the radius."""
 LARGER_DENSITY, LEAST_DENSITY = 3.0, 1e-5
@@ -42,18 +55,23 @@ ALIKE, MOST_GROWTH = 0.05, 4.0
 """Relative difference of the actual and the predicted decrease up to which the radius grows by the
 second of these, if the objective reopens; others begin with a radius that is wide enough."""
 CUT_GROWTH = 2.0
-"""The same of others where bounds, which are not satisfied yet, cut a step at the radius."""
+"""Growth of the radius of other objectives where bounds, which are not satisfied yet, cut a step at
+the radius."""
 SHORT_FRACTION = 0.1
 """Fraction of a step at the radius below which it was too long for the bounds that cut it."""
 MATCHED = 1e-4
-"""Largest |y - s| at which the radius follows such steps."""
+"""Largest |y - s| at which the radius follows steps that bounds cut."""
 CUT_RADIUS = 10.0
-"""The largest radius after such a step, relative to what was left of it."""
+"""Largest radius after a step that bounds cut, relative to the length that was left of it."""
 LEAST_CUT_RADIUS = 1e-3
-"""The least radius after such a step."""
+"""Least value of that bound of the radius after a step that bounds cut."""
 SHORTENED = 0.3
-"""Ratio of the radius after such a step while outputs are not matched; its square, where the step
-was refused."""
+"""Radius after a step that bounds cut while |y - s| is above MATCHED, relative to the step; the
+square of this where the step was refused."""
+LEAST_VALUE = 1e-10
+"""Least magnitude of the objective that decreases are relative to, relative to the first one."""
+NOISE = 1e-2
+"""Change of the merit function that is rounding, relative to the decrease at which a solve ends."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,11 +146,11 @@ class BoundedSteps(Generic[X]):
     def step(self, model: QuadraticModel) -> BoundedStep:
         """A corrected step towards a smaller mu if the model is convex, else a plain one."""
         trial = solve_subproblem(model, self.radius, self.shift)
-        ahead = self.product > 2.0 * self.final_mu or self.ended.z.mu > 1.01 * self.final_mu
+        ahead = self.product > 2.0 * self.final_mu or self.ended.z.mu > LAST_MU * self.final_mu
         if trial.newton and not self.cautious and ahead:
             step = self._corrected(trial, model)
             short = step.fraction * step.trial.norm <= MAX_STRETCH * self.radius
-            if short and step.decrease > -10 * self.noise:
+            if short and step.decrease > -PREDICTED_NOISE * self.noise:
                 return step
         self.cautious = True
         barrier = self.ended.z
@@ -153,7 +171,7 @@ class BoundedSteps(Generic[X]):
                 break
             further = barrier.centered_targets(y, along, mu, targets)
             other, other_s, other_pulled = self._direction(trial, further, model)
-            if other.primal + other.dual < along.primal + along.dual + 1e-3:
+            if other.primal + other.dual < along.primal + along.dual + LEAST_GAIN:
                 break
             targets, along, s, pulled = further, other, other_s, other_pulled
         barrier = barrier.with_mu(mu)
@@ -186,7 +204,7 @@ class BoundedSteps(Generic[X]):
         barrier = barrier or self.ended.z
         y, weights = self.ended.outputs.y, self.objective.bounds.weights
         along = along or barrier.aim(y, self.objective.push(s, model), targets)
-        self.penalty = 1.2 * along.largest_force  # of this step alone
+        self.penalty = PENALTY_RATIO * along.largest_force  # of this step alone
         slope = float(np.vdot(model.gradient, s)) - float(np.vdot(weights * self.rho, along.dy))
         gradient = model.gradient if pulled is None else model.gradient + pulled
         norm2 = trial.norm**2 if pulled is None else float(np.vdot(s, model.metric_product(s)))
@@ -206,11 +224,13 @@ class BoundedSteps(Generic[X]):
         inside = along.primal >= 1.0  # a slack at the end of a whole step is kept off its bound
         longest = 1.0 if inside else barrier.boundary_fraction * along.primal
         fraction, predicted = longest, decrease(longest)
-        if predicted < -10 * self.noise and self._misses_equations(model):
+        if predicted < -PREDICTED_NOISE * self.noise and self._misses_equations(model):
             weight = self._weight(predicted, self._residual_decrease(longest, As))
             predicted = decrease(longest)
         for shorter in SHORTER_FRACTIONS:
-            if abs(predicted) <= 10 * self.noise or (pulled is not None and predicted > 0):
+            if abs(predicted) <= PREDICTED_NOISE * self.noise or (
+                pulled is not None and predicted > 0
+            ):
                 break
             other = decrease(shorter * longest)
             if other < predicted:
@@ -260,7 +280,7 @@ class BoundedSteps(Generic[X]):
         length = norm * step.fraction
         radius, reopens = next_radius(last, length, ratio), self.objective.reopens
         alike = abs(ratio - 1.0) <= ALIKE
-        if alike and reopens and length > 0.7 * last:
+        if alike and reopens and length > AT_RADIUS * last:
             return max(radius, MOST_GROWTH * last)
         unmatched = self.ended.violation > MATCHED
         if alike and unmatched and not (reopens or step.trial.newton):
@@ -272,11 +292,11 @@ class BoundedSteps(Generic[X]):
         if not reopens:
             return radius
         # a radius as short as the step would lead nowhere while bounds are not satisfied
-        return min(last, norm) * (SHORTENED if ratio > 1e-4 else SHORTENED**2)
+        return min(last, norm) * (SHORTENED if ratio > ACCEPTED_RATIO else SHORTENED**2)
 
     def scale(self) -> float:
         """Magnitude of the objective, to which decreases are relative; positive."""
-        return max(abs(self.ended.outputs.value), 1e-10 * self.density * self._measure)
+        return max(abs(self.ended.outputs.value), LEAST_VALUE * self.density * self._measure)
 
     @property
     def final_mu(self) -> float:
@@ -287,7 +307,7 @@ class BoundedSteps(Generic[X]):
     @property
     def noise(self) -> float:
         """Change of the merit function that is none."""
-        return 1e-2 * self.criteria.decrease * self.scale()
+        return NOISE * self.criteria.decrease * self.scale()
 
     @property
     def _measure(self) -> float:

@@ -9,6 +9,8 @@ from hovi.system.dataclass import dataclass
 ROOM = 2e-7
 """Distance by which bounds are moved inwards while a nearby solution is followed, and by which
 outputs may miss them at the end, relative to the range."""
+MAX_ITERATIONS = 500
+"""Maximum number of steps of a solve where none is given."""
 ROUGH_BARRIER, ROUGH_DECREASE = 1e-2, 1e-3
 """Last barrier parameter of a rough solve, relative to the mean density of the objective, and the
 predicted decrease at which it ends, relative to the value."""
@@ -33,7 +35,7 @@ class Criteria:
 
     decrease: float = 1e-11
     step: float = 1e-13
-    max_iterations: int = 500
+    max_iterations: int = MAX_ITERATIONS
     time_limit: float | None = None
     radius: float = 10.0
     escape_saddles: bool = True

@@ -21,6 +21,8 @@ Array = npt.NDArray[np.float64]
 X = TypeVar("X")
 Z = TypeVar("Z")
 
+LEAST_VALUE = 1e-12
+"""Least magnitude of an objective that densities and penalties are relative to."""
 FEASIBILITY_TOLERANCE = 1e-8
 """Largest |y - s| of a solution, relative to the range of a bound."""
 KEPT = 1e-6
@@ -77,7 +79,7 @@ class Outputs:
 
     def density(self, measure: float) -> float:
         """The mean density of the objective, an integral over a measure; positive."""
-        return max(abs(self.value), 1e-12) / measure
+        return max(abs(self.value), LEAST_VALUE) / measure
 
 
 @dataclass(eq=False)

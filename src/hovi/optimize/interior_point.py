@@ -40,11 +40,16 @@ import numpy.typing as npt
 
 from hovi.optimize.barrier import Barrier, Direction
 from hovi.optimize.bounded_objective import BoundedObjective, Refinement
-from hovi.optimize.bounded_steps import SHORT_FRACTION, BoundedStep, BoundedSteps
+from hovi.optimize.bounded_steps import LAST_MU, SHORT_FRACTION, BoundedStep, BoundedSteps
 from hovi.optimize.criteria import Criteria
 from hovi.optimize.ended import FEASIBILITY_TOLERANCE, Ended, Iteration, Outputs, Reason
 from hovi.optimize.kkt_model import size_of
-from hovi.optimize.quadratic_model import QuadraticModel, decrease_ratio, next_shift
+from hovi.optimize.quadratic_model import (
+    ACCEPTED_RATIO,
+    QuadraticModel,
+    decrease_ratio,
+    next_shift,
+)
 from hovi.optimize.start import Start
 from hovi.system.deadline import raise_if_late
 from hovi.system.interruption import raise_if_interrupted
@@ -59,21 +64,32 @@ WHOLE_STEP = 0.9
 FIRST_REFINEMENT = 1e-2
 """Mean product z gap, relative to the mean density, below which outputs are first refined."""
 NEXT_REFINEMENT = 0.1
-"""The next one, relative to the last."""
+"""Mean product z gap below which outputs are refined again, relative to that at the last time."""
 REOPENED, MOST_REOPENED = 0.1, 1e-2
 """Least barrier parameter after a refinement with outputs outside their bounds, relative to how far
 they are and to the mean density, and its largest value, relative to the mean density."""
 LEAST_REOPENED, LARGEST_REOPENED, MAX_REOPENINGS = 1e-5, 0.1, 6
-"""Where outputs may be missed for a while: the least such parameter, the largest |y - s| at which
-slacks are moved away from their bounds instead of ending as diverged, and how many times."""
+"""Where outputs may be missed for a while, slacks are moved away from their bounds instead of
+ending as diverged: the least barrier parameter then, relative to the mean density, the largest
+|y - s|, and how many times."""
 SADDLE_LEVEL, SADDLE_MARGIN = 1e-4, 0.1
 """Least barrier parameter, relative to the mean density, with which a solve goes on from a saddle
 that an inexact model led to, and the least distance of slacks from their bounds then, relative to
 the range, per barrier parameter."""
 REOPENED_LEVEL = 0.3
-"""The least such parameter, relative to the mean product of multipliers and gaps."""
+"""Least barrier parameter when slacks are moved away from their bounds, relative to the mean
+product of multipliers and gaps."""
 SAVED_AGAIN = 1.5
 """A saved iterate is replaced while the mean product is below this many times its first one."""
+LAST_PRODUCT = 10.0
+"""Largest mean product of multipliers and gaps at the end, relative to the last barrier
+parameter."""
+SOLVED_LEVEL, SOLVED_VIOLATION = 10.0, 0.1
+"""When the problem of a barrier parameter mu is solved by plain steps: the largest predicted
+decrease and complementarity, relative to mu, and the largest |y - s|, relative to mu over the mean
+density."""
+MU_DECREASE = 0.1
+"""Largest ratio of successive barrier parameters of plain steps."""
 MAX_REFINEMENTS = 40
 """Maximum number of refinements."""
 CUT_FRACTION, MOST_CUT, RAISED = 0.5, 4, 10.0
@@ -81,7 +97,8 @@ CUT_FRACTION, MOST_CUT, RAISED = 0.5, 4, 10.0
 where it is), the number of such steps in a row after which the barrier parameter is raised, since
 it has fallen too early, and the factor by which it is raised."""
 LEAST_RAISED_GAP = 1e-9
-"""Least distance of slacks from their bounds after that, relative to the range."""
+"""Least distance of slacks from their bounds after the barrier parameter is raised, relative to the
+range."""
 OUTSIDE_RADIUS = 3.0
 """Radius to which the trust region is cut where outputs are added outside of their bounds."""
 DENSITY_FLOOR = 1e-9
@@ -94,7 +111,7 @@ CURVED = 0.5
 """Ratio of the actual and the predicted decrease below which a step under equations is corrected
 for their curvature."""
 MAX_UNMET = 4
-"""Steps that predict next to nothing after which it ends although equations do not hold."""
+"""Steps that predict next to nothing after which a solve ends although equations do not hold."""
 MAX_SADDLES = 5
 """Number of saddles from which steps along negative curvature go on."""
 
@@ -208,7 +225,7 @@ class _Iteration(BoundedSteps[X]):
         last, radius = self.radius, self.radius_after(step, ratio)
         self.shift = next_shift(trial.shift, trial.norm, radius)
         self.radius = radius
-        refused = ratio <= 1e-4
+        refused = ratio <= ACCEPTED_RATIO
         self.stalled = self.stalled + 1 if refused else 0
         if refused:
             if not self.cautious:  # the same again, as a plain step
@@ -325,7 +342,8 @@ class _Iteration(BoundedSteps[X]):
 
     def _finished(self, step: BoundedStep, accepted: bool) -> bool:
         """Whether the last step, of the last mu, predicts next to nothing for its whole length."""
-        last = step.barrier.mu <= 1.01 * self.final_mu and self.product <= 10.0 * self.final_mu
+        final = self.final_mu
+        last = step.barrier.mu <= LAST_MU * final and self.product <= LAST_PRODUCT * final
         enough = max(self.criteria.decrease, self.criteria.enough) * self.scale()
         whole = accepted and step.fraction >= WHOLE_STEP
         small = max(step.remaining, step.decrease) <= enough
@@ -340,12 +358,12 @@ class _Iteration(BoundedSteps[X]):
         last, fraction = self.final_mu, barrier.mu / self.density
         solved = (
             step.trial.newton
-            and step.decrease <= 10 * barrier.mu * self._measure
-            and ended.violation <= max(FEASIBILITY_TOLERANCE, 0.1 * fraction)
-            and barrier.complementarity() <= 10 * barrier.mu
+            and step.decrease <= SOLVED_LEVEL * barrier.mu * self._measure
+            and ended.violation <= max(FEASIBILITY_TOLERANCE, SOLVED_VIOLATION * fraction)
+            and barrier.complementarity() <= SOLVED_LEVEL * barrier.mu
         )
         if solved:
-            mu = max(last, min(0.1 * barrier.mu, self.density * fraction**1.5))
+            mu = max(last, min(MU_DECREASE * barrier.mu, self.density * fraction**1.5))
             ended.z = barrier.with_mu(mu)
 
     def _raise_mu(self, step: BoundedStep) -> None:

@@ -37,6 +37,8 @@ X = TypeVar("X")
 
 DELTA = 1e-8
 """delta, relative to |A|^2 / |H|, where |A| is that of a family of equations."""
+SMALLER_DELTA = 1e-2
+"""Second delta with which negative eigenvalues are counted, relative to the first one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -356,7 +358,7 @@ class KktModel:
         border: further columns B of H, (size, p), and their corner C, of unknowns that are in no
             equation.
         """
-        factors = [self.exact_factor(0.0, d * DELTA) for d in (1.0, 1e-2)]
+        factors = [self.exact_factor(0.0, d * DELTA) for d in (1.0, SMALLER_DELTA)]
         counts = {factor.negative + _negative_pivots(factor, border) for factor in factors}
         return -1 if len(counts) > 1 else max(counts.pop() - self.equations, -1)
 

@@ -40,6 +40,11 @@ LEAST_FRACTION = 1e-9
 """Smallest fraction of a step that is tried."""
 MAX_SECOND_ORDER_CORRECTIONS = 2
 """Corrections of a step by the residual where it leads."""
+CORRECTED_RATIO = 0.99
+"""Ratio of the residuals after successive second-order corrections from which these end."""
+LARGEST_RESIDUAL, SMALL_RESIDUAL = 1e4, 1e-4
+"""Largest residual of a point that is accepted, and the residual up to which the objective alone
+may decide; relative to the first one, or to 1 if that is larger."""
 FILTER_MARGIN = 1e-5
 """Decrease of the residual that a step needs, relative to it."""
 VALUE_MARGIN = 1e-8
@@ -51,7 +56,10 @@ LARGE_SLOPE = 1e100
 ROUNDING = 1e-13
 """Relative rounding error of the objective."""
 MAX_RESTORATIONS = 4
-"""How often the residual is made smaller alone."""
+"""Maximum number of times that the residual is made smaller alone."""
+LAST_RATIO = 0.1
+"""Ratio of the relative decreases of successive Newton steps above which the second one is the
+last: only rounding errors remain."""
 LAST_DECREASE = 1e-12
 """Relative decrease in a Newton step after which only rounding errors remain."""
 REMAINING_DECREASE = 1e-26
@@ -118,7 +126,7 @@ class _Search(Generic[X]):
         self.criteria = criteria
         self.report = report
         first = max(1.0, self.size)
-        self.largest, self.small = 1e4 * first, 1e-4 * first
+        self.largest, self.small = LARGEST_RESIDUAL * first, SMALL_RESIDUAL * first
         self.filter = _Filter()
         self.shift = 0.0
         self.restorations = 0
@@ -198,7 +206,7 @@ class _Search(Generic[X]):
 
     def _is_last(self, decrease: float) -> bool:
         """Whether only rounding errors remain after a Newton step of this relative decrease."""
-        if decrease <= LAST_DECREASE or decrease > 0.1 * self.before:
+        if decrease <= LAST_DECREASE or decrease > LAST_RATIO * self.before:
             return True
         return decrease * (decrease / self.before) ** 2 <= REMAINING_DECREASE
 
@@ -271,7 +279,7 @@ class _Search(Generic[X]):
             accepted = self._accepted(there.value, size, 1.0, slope)
             if accepted is not None:
                 return _Trial(x, there, 1.0, accepted)
-            if not size < 0.99 * before:
+            if not size < CORRECTED_RATIO * before:
                 break
         return None
 

@@ -18,6 +18,18 @@ from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 
+ACCEPTED_RATIO = 1e-4
+"""Ratio of the actual and the predicted decrease above which a step is accepted."""
+PREDICTED_NOISE = 10.0
+"""Predicted decrease that is rounding, relative to an actual one that is rounding."""
+POOR_RATIO, GOOD_RATIO, BEST_RATIO = 0.25, 0.75, 0.9
+"""Ratios of the actual and the predicted decrease: below the first one the radius shrinks, above
+the second one it grows, and above the third one it doubles."""
+LEAST_SHRINKAGE, SMALL_GROWTH = 0.25, 1.4
+"""Least factor by which the radius shrinks, and the factor by which it grows if not twofold."""
+AT_RADIUS = 0.7
+"""Length of a step, relative to the radius, above which the radius limited the step."""
+
 
 class Factor(Protocol):
     """A factorisation of H + shift D."""
@@ -111,7 +123,7 @@ def decrease_ratio(actual: float, predicted: float, noise: float) -> float:
     """Actual over predicted decrease; 1 where both are rounding noise, -1 where not finite."""
     if not math.isfinite(actual):
         return -1.0
-    if abs(actual) <= noise and abs(predicted) <= 10 * noise:
+    if abs(actual) <= noise and abs(predicted) <= PREDICTED_NOISE * noise:
         return 1.0
     return actual / predicted if predicted > 0 else -1.0
 
@@ -127,9 +139,9 @@ def next_radius(radius: float, norm: float, ratio: float) -> float:
     Where the model failed: the minimum of a parabola along the step, within bounds.
     norm: length of the step. ratio: actual over predicted decrease.
     """
-    if ratio < 0.25:
+    if ratio < POOR_RATIO:
         fraction = min(0.5, 0.5 / (1.0 - min(ratio, 0.0)))
-        return max(0.25, fraction) * min(radius, norm)
-    if ratio > 0.75 and norm > 0.7 * radius:
-        return (2.0 if ratio > 0.9 else 1.4) * radius
+        return max(LEAST_SHRINKAGE, fraction) * min(radius, norm)
+    if ratio > GOOD_RATIO and norm > AT_RADIUS * radius:
+        return (2.0 if ratio > BEST_RATIO else SMALL_GROWTH) * radius
     return radius

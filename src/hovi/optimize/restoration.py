@@ -24,11 +24,15 @@ Array = npt.NDArray[np.float64]
 X = TypeVar("X")
 
 MAX_STEPS = 30
-"""Maximum number of steps."""
+"""Maximum number of steps of a restoration."""
 RESTORED = 0.1
-"""Ratio of the residuals after and before."""
+"""Ratio of the residuals after and before a restoration, at which it ends."""
+ACCEPTED_RATIO = 0.1
+"""Ratio of the actual and the predicted decrease of |c| above which a step is accepted."""
 FIRST_DAMPING, LEAST_DAMPING, MAX_DAMPING = 1e-4, 1e-14, 1e6
 """Damping relative to A^T A: the first, and its bounds."""
+DAMPING_DECREASE, DAMPING_GROWTH = 0.1, 10.0
+"""Factors on the damping after a step that is accepted and after one that is not."""
 STUCK_DAMPING = 1e-12
 """Damping of a step that shows a stationary point of |c|, as it changes little."""
 OUTWEIGHING = 1e11
@@ -36,7 +40,7 @@ OUTWEIGHING = 1e11
 FLATNESS = 1e-6
 """Negative curvature of |c|^2, relative to A^T A, that counts as none."""
 STUCK_DECREASE = 1e-13
-"""Relative decrease of |c| that a step predicts at such a point."""
+"""Relative decrease of |c| that a step predicts at a stationary point of |c|, at most."""
 
 
 def restore(
@@ -78,12 +82,12 @@ def restore(
         gained = size - size_of(there.y)
         ratio, length = gained / predicted, model.length(step)
         ended.steps.append(Iteration(there.value, predicted, ratio, damping, length, size))
-        if gained > 0.1 * predicted and math.isfinite(there.value):
+        if gained > ACCEPTED_RATIO * predicted and math.isfinite(there.value):
             ended.x, ended.outputs = x, there
-            damping = max(0.1 * damping, LEAST_DAMPING)
+            damping = max(DAMPING_DECREASE * damping, LEAST_DAMPING)
             model = objective.model(x, none)
         else:
-            damping *= 10.0
+            damping *= DAMPING_GROWTH
             step_of = _newton_step
     ended.z = model.least_squares_multipliers()
     return ended

@@ -20,6 +20,7 @@ from hovi.optimize.chord_steps import REMAINING_DECREASE, polish
 from hovi.optimize.criteria import Criteria
 from hovi.optimize.ended import Ended, Iteration, Outputs, Reason
 from hovi.optimize.quadratic_model import (
+    ACCEPTED_RATIO,
     Factor,
     QuadraticModel,
     decrease_ratio,
@@ -47,6 +48,25 @@ SINGULAR = 1e-13
 """Negative curvature, relative to the largest, that is one of rounding errors."""
 STALLED_STEPS = 5
 """Number of steps that Criteria.stalled compares."""
+ROUNDING = 1e-14
+"""Change of the objective that is rounding, relative to its value."""
+LEAST_RADIUS = 1e-14
+"""Radius below which a solve ends as diverged, relative to the first one."""
+FAILED_GROWTH, LONG_GROWTH = 4.0, 10.0
+"""Ratio of successive shifts without an upper end: after a factorisation that failed, and after a
+step that is too long."""
+NEAR_SHIFT, FAR_SHIFT, LONG_SHIFT = 1e-5, 0.03, 1e-6
+"""Least next shift without an upper end, relative to the curvature: after a factorisation that
+failed in a search that began with a shift, in another one, and after a step that is too long."""
+FAILED_PART, STEP_PART = 0.1, 1e-3
+"""Least next shift between two ends, relative to the upper one: after a factorisation that failed,
+and after a step."""
+SHORTEST, LONGEST = 0.75, 1.25
+"""Lengths of a step, relative to the radius, between which it fits."""
+HARD_WIDTH = 0.2
+"""Width of the bracket of the shift, relative to the shift, at which a short step is extended."""
+ALONE = 1e-6
+"""Length of a short step, relative to the radius, below which only its extension counts."""
 
 
 NO_OUTPUTS: Array = np.zeros(0)
@@ -149,13 +169,13 @@ def _iterate(
         last = settled and _is_last(ended, trial, exact, before, criteria)
         candidate = objective.retract(ended.x, trial.step, model)
         value = objective.value(candidate)
-        noise = 1e-14 * abs(ended.value)
+        noise = ROUNDING * abs(ended.value)
         ratio = decrease_ratio(ended.value - value, trial.decrease, noise)
         ended.steps.append(Iteration(value, trial.decrease, ratio, trial.shift, radius))
         if report is not None:
             report(len(ended.steps), min(value, ended.value))
         radius = next_radius(radius, trial.norm, ratio)
-        accepted = ratio > 1e-4
+        accepted = ratio > ACCEPTED_RATIO
         if accepted:
             if trial.along_negative_curvature and stationary:
                 ended.saddles.append(ended.value)
@@ -178,7 +198,7 @@ def _iterate(
             exact = criteria.exact and (settled or before <= EXACT_MODEL_DECREASE * abs(value))
             known = (None, None) if exact else (model, trial.step)
             model = objective.model(ended.x, *known)
-        elif radius < 1e-14 * criteria.radius:
+        elif radius < LEAST_RADIUS * criteria.radius:
             ended.why = Reason.DIVERGED
             return
 
@@ -261,8 +281,9 @@ class _ShiftSearch:
         self.indefinite = True
         self.low = max(self.low, shift)
         if math.isfinite(self.high):
-            return max(math.sqrt(self.low * self.high), 0.1 * self.high)
-        return max(4.0 * shift, (1e-5 if self.reached else 0.03) * self._scale())
+            return max(math.sqrt(self.low * self.high), FAILED_PART * self.high)
+        least = (NEAR_SHIFT if self.reached else FAR_SHIFT) * self._scale()
+        return max(FAILED_GROWTH * shift, least)
 
     def step_at(self, factor: Factor, shift: float) -> Trial:
         """The step for a shift."""
@@ -290,8 +311,8 @@ class _ShiftSearch:
         if trial.norm < self.radius and free and self.low == 0.0:
             return 0.0
         if not math.isfinite(self.high):
-            return max(10 * shift, 1e-6 * self._scale())
-        return max(math.sqrt(self.low * self.high), 1e-3 * self.high)
+            return max(LONG_GROWTH * shift, LONG_SHIFT * self._scale())
+        return max(math.sqrt(self.low * self.high), STEP_PART * self.high)
 
     def _scale(self) -> float:
         scale = self.model.curvature_scale()
@@ -301,10 +322,10 @@ class _ShiftSearch:
 
     def fits(self, trial: Trial) -> bool:
         """Whether a step is within a quarter of the radius, or a shorter Newton step."""
-        within = trial.norm <= 1.25 * self.radius
+        within = trial.norm <= LONGEST * self.radius
         # under equations steps for small shifts may stay short where the Newton step is long
         least = self.newton_too_long and trial.shift <= LEAST_SHIFT * self._scale()
-        return within and (trial.newton or least or trial.norm >= 0.75 * self.radius)
+        return within and (trial.newton or least or trial.norm >= SHORTEST * self.radius)
 
     def is_short(self, trial: Trial) -> bool:
         """Whether a step ends inside the radius although H is indefinite."""
@@ -312,7 +333,7 @@ class _ShiftSearch:
 
     def is_hard_case(self, shift: float) -> bool:
         """Whether the step is too short even at the smallest shift with H + shift D definite."""
-        return self.indefinite and (shift - self.low) <= 0.2 * shift
+        return self.indefinite and (shift - self.low) <= HARD_WIDTH * shift
 
     def complete(self, factor: Factor, trial: Trial) -> Trial:
         """A short step extended to the radius along the lowest eigenvector of H relative to D.
@@ -336,5 +357,5 @@ class _ShiftSearch:
         # Rayleigh quotient u.H u by one more inverse iteration
         rayleigh = 1.0 / float(np.vdot(Du, factor.solve(Du))) - trial.shift
         decrease = trial.decrease + trial.shift * b * length - 0.5 * length**2 * min(rayleigh, 0.0)
-        alone = trial.norm < 1e-6 * self.radius
+        alone = trial.norm < ALONE * self.radius
         return Trial(step, decrease, trial.shift, self.radius, factor, alone)

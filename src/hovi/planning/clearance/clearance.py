@@ -22,6 +22,8 @@ MAX_OBSTACLES = 1_000
 """Maximum number of obstacles."""
 MOST_GAP = 1e-5
 """Most by which a pair that is nearer than the margin at an end may be nearer, in [m]."""
+GAP_ROUNDING = 1e-6
+"""Excess of given gaps over MOST_GAP that is accepted, in [m]."""
 TOUCH_DEPTH = 1e-3
 """Depth by which shapes that may touch may overlap, in [m]."""
 
@@ -78,7 +80,7 @@ class Clearance:
         object.__setattr__(self, "obstacles", named)
         for name in ("may_touch", "left_out"):
             object.__setattr__(self, name, _pairs_of_names(getattr(self, name), name))
-        if not all(0.0 <= gap <= MOST_GAP + 1e-6 for *_, gap in self.gaps):
+        if not all(0.0 <= gap <= MOST_GAP + GAP_ROUNDING for *_, gap in self.gaps):
             raise InputError(
                 f"gaps must be lengths from 0 to {MOST_GAP:g} m, got {self.gaps!r:.200}."
             )

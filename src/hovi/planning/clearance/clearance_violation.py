@@ -23,6 +23,9 @@ REFINEMENT_PASSES = 4
 """Refinement passes, each with samples four times as dense."""
 REFINEMENT_DISTANCE = 0.05 * DISTANCE_SCALE
 """Closest approaches up to this much above the required distance are refined, in [m]."""
+DIGITS, MOST_DIGITS, MARGIN_DIGITS = 3, 17, 6
+"""Significant digits in messages: of a distance, at most if it has to differ from a margin, and of
+a margin at least."""
 TOUCHING = 1e-9
 """Distance or depth up to which a pair touches, in [m]: rounding errors may have either sign."""
 
@@ -191,11 +194,11 @@ def approach_sentence(
     digits = digits_between(distance, margin)
     return (
         f"{distances.pairs[pair]} {distance_in_words(distance, digits)} at "
-        f"t = {t:.3g} s, the margin is {margin:.{max(digits, 6)}g} m"
+        f"t = {t:.3g} s, the margin is {margin:.{max(digits, MARGIN_DIGITS)}g} m"
     )
 
 
-def distance_in_words(distance: float, digits: int = 3) -> str:
+def distance_in_words(distance: float, digits: int = DIGITS) -> str:
     """A signed distance as the predicate of a sentence about a pair. digits: of it."""
     if abs(distance) < TOUCHING:
         return "touch"
@@ -205,13 +208,13 @@ def distance_in_words(distance: float, digits: int = 3) -> str:
 
 
 def digits_between(distance: float, margin: float) -> int:
-    """The number of digits, 3 or more, with which a distance and a margin look different."""
-    unlike = (n for n in range(3, 17) if f"{distance:.{n}g}" != f"{margin:.{n}g}")
-    return next(unlike, 17)
+    """The number of digits, DIGITS or more, with which a distance and a margin look different."""
+    unlike = (n for n in range(DIGITS, MOST_DIGITS) if f"{distance:.{n}g}" != f"{margin:.{n}g}")
+    return next(unlike, MOST_DIGITS)
 
 
 def less_than_margin(distance: float, margin: float) -> str:
     """A distance below the margin as the predicate of a sentence about a pair, and the margin."""
     digits = digits_between(distance, margin)
-    needed = f", less than the margin of {margin:.{max(digits, 6)}g} m"
+    needed = f", less than the margin of {margin:.{max(digits, MARGIN_DIGITS)}g} m"
     return distance_in_words(distance, digits) + ("" if distance < TOUCHING else needed)

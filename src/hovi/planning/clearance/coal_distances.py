@@ -33,6 +33,10 @@ LOOSER_TOLERANCES = 1e-8, 1e-6
 """Tolerances with which a pair is measured again where EPA fails, as for boxes that just touch."""
 FAILED = 1e100
 """Depth of an overlap in [m] that only a failed computation has."""
+UNIT_LENGTH = 1e-6
+"""Deviation of a normal's squared length from 1 from which it is none."""
+SAME_CENTER = 1e-9
+"""Distance of the centers of two shapes up to which they have no direction, in [m]."""
 PRISM_SIDES = 180
 """Sides of the prism that replaces an overlapping cylinder: within 0.02 % of its radius."""
 DIFFERENCE_STEP = 1e-4
@@ -133,7 +137,7 @@ class CoalDistances:
         results = [self._results[k] for k in pairs]
         normals = np.array([result.normal for result in results]).reshape(-1, 3)
         points = np.array([result.getNearestPoint1() for result in results]).reshape(-1, 3)
-        valid = np.abs(np.vecdot(normals, normals) - 1.0) < 1e-6
+        valid = np.abs(np.vecdot(normals, normals) - 1.0) < UNIT_LENGTH
         for i in np.flatnonzero(~(valid & np.isfinite(points).all(axis=1))):
             normals[i], points[i] = self._between_centers(int(pairs[i]))
         return np.concatenate([normals, np.cross(points, normals)], axis=1)
@@ -144,7 +148,7 @@ class CoalDistances:
         first, second = (self._places.oMg[k].translation for k in (ends.first, ends.second))
         offset = np.asarray(second - first)
         length = float(np.linalg.norm(offset))
-        n = offset / length if length > 1e-9 else np.array([0.0, 0.0, 1.0])
+        n = offset / length if length > SAME_CENTER else np.array([0.0, 0.0, 1.0])
         return n, np.asarray(first)
 
 

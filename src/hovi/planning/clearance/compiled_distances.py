@@ -31,6 +31,7 @@ POINTS, CYLINDER, OTHER = range(3)
 EXACT, FAR, UNKNOWN = range(3)
 """How a distance is known: to rounding, as a lower bound, or not at all."""
 _GROUPS: dict[Group, int] = {SO2: 1, SE3: 2, SO3: 3, SE2: 4}
+"""Numbers of the groups of joints in compiled code."""
 
 
 class CompiledDistances:

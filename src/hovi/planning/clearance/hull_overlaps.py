@@ -23,6 +23,8 @@ from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 
+LOOKED_BEYOND = 1e-3
+"""Distance beyond the margin up to which hulls are measured, in [m]."""
 SAMPLES = 129
 """Number of samples of a motion at which the meshes of pairs that are left out are looked at."""
 
@@ -65,7 +67,7 @@ def hull_overlaps(
     distances, touching = distances_between(robot, apart), set(map(frozenset, clearance.may_touch))
     found = dict[tuple[str, str], HullOverlap]()
     for where, at in q.items():
-        d = distances.values(at[None], apart.margin + 1e-3)[0]
+        d = distances.values(at[None], apart.margin + LOOKED_BEYOND)[0]
         for k in np.flatnonzero(d < apart.margin):
             pair = distances.pairs[k]
             links = pair.link, pair.other

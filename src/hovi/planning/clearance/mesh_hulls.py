@@ -20,6 +20,8 @@ Index = npt.NDArray[np.int32]
 
 _COMPUTED = b"hull 1, Coal " + coal.__version__.encode()
 """Part of the digest of a mesh, to be changed with what is computed or how meshes are read."""
+_LENGTH, _HEADER = 8, 16
+"""Bytes of the length of what is hashed, and of the sizes before the points in a file."""
 _SIZES = np.dtype("<i8")
 _POINTS = np.dtype("<f8")
 _CORNERS = np.dtype("<i4")
@@ -47,7 +49,7 @@ def mesh_hull(path: Path, content: bytes, scale: Sequence[float]) -> coal.Convex
 def _digest(*parts: bytes) -> bytes:
     found = hashlib.sha256()
     for part in (_COMPUTED, *parts):
-        found.update(len(part).to_bytes(8, "little"))
+        found.update(len(part).to_bytes(_LENGTH, "little"))
         found.update(part)
     return found.digest()
 
@@ -68,8 +70,8 @@ def _unpacked(content: bytes, mesh: bytes) -> coal.Convex | None:
     if check != _digest(mesh, rest):
         return None
     count, faces = (int(size) for size in np.frombuffer(rest, _SIZES, 2))
-    points = np.frombuffer(rest, _POINTS, 3 * count, offset=16).reshape(count, 3)
-    corners = np.frombuffer(rest, _CORNERS, offset=16 + points.nbytes).reshape(faces, 3)
+    points = np.frombuffer(rest, _POINTS, 3 * count, offset=_HEADER).reshape(count, 3)
+    corners = np.frombuffer(rest, _CORNERS, offset=_HEADER + points.nbytes).reshape(faces, 3)
     return _convex(points, corners)
 
 

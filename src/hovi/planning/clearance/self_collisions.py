@@ -20,7 +20,7 @@ Array = npt.NDArray[np.float64]
 SAMPLES = 128
 """Number of random configurations at which pairs are looked at."""
 FIRST_SAMPLES = 8
-"""Number of those at which all pairs are; most are apart at one of them."""
+"""Number of random configurations at which all pairs are looked at; most pairs are apart at one."""
 
 
 @lru_cache(maxsize=16)

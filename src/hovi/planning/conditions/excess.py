@@ -38,6 +38,7 @@ REFINEMENT_FRACTION = 0.05
 """The largest extreme of an entry in an interval is refined if it is closer than this to a bound,
 as a fraction of its scale."""
 COARSE_MODES = 4
+"""Largest number of inner modes of grids on which `excess_of` looks at fewer samples first."""
 COARSE = 4, 2
 """Stride of the samples that `excess_of` looks at first: on grids of at most COARSE_MODES inner
 modes, and on others."""

@@ -22,7 +22,7 @@ QUANTITIES = {
 }
 """The quantities, in the order of the rows of `Limits`, and their names in messages."""
 DERIVATIVES = {"q": 0, "v": 1, "a": 2, "jerk": 3}
-"""Those that are derivatives of the coordinates, and their order."""
+"""The quantities that are derivatives of the coordinates, and their order."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -33,6 +33,7 @@ MAX_PARTS = 200
 _KEY = f"coacd-1-{THRESHOLD:g}"
 """Part of the name of a cached file, to be changed with what is computed."""
 _MAX_SECONDS = 600.0
+"""Time after which a mesh counts as one that cannot be divided, in [s]."""
 _WORKER = Path(__file__).with_name("coacd_worker.py")
 
 

@@ -25,6 +25,8 @@ MAX_NUMBER = 1e9
 """Largest number of an obstacle, in [m] or [rad]."""
 MIN_LENGTH = 1e-9
 """Smallest length of an obstacle, in [m]: volumes and inertias of smaller ones vanish."""
+SHOWN = 200
+"""Number of characters of a value that a message shows."""
 GRASPED_KEYS = {
     "frame": "the name of a link of the robot",
     "mass": "a positive number of kilograms",
@@ -177,7 +179,7 @@ def turned_to(direction: Array) -> Array:
 
 def _short(value: object) -> str:
     words = " ".join(repr(value).split())
-    return words if len(words) <= 200 else f"{words[:200]}..."
+    return words if len(words) <= SHOWN else f"{words[:SHOWN]}..."
 
 
 def _tuples(value: Any) -> Any:

@@ -30,6 +30,11 @@ _OBJECT = (
 )
 _PRIMITIVES = {"1": "box", "2": "sphere", "3": "cylinder", "4": "cone"}
 _DIMENSIONS = {"box": 3, "sphere": 1, "cylinder": 2}
+"""Number of lengths of each primitive."""
+MAX_INDEX = 1e9
+"""Largest number of a vertex."""
+UNIT_TOLERANCE = 1e-3
+"""Largest deviation of a quaternion's length from 1."""
 MAX_OBJECTS = 1_000
 """Maximum number of objects of a scene."""
 
@@ -152,7 +157,7 @@ def _corners(node: YamlNode) -> list[float]:
         node.mapping("vertex_indices").need("vertex_indices") if node.is_mapping else node
     ).items()
     numbers = [each.number() for each in nodes]
-    if len(numbers) != 3 or any(x != int(x) or abs(x) > 1e9 for x in numbers):
+    if len(numbers) != 3 or any(x != int(x) or abs(x) > MAX_INDEX for x in numbers):
         raise node.error("a triangle must have three whole numbers")
     return numbers
 
@@ -166,7 +171,7 @@ def _pose(node: YamlNode) -> pin.SE3:
     length = float(np.linalg.norm(xyzw))
     if length == 0.0:
         return pin.SE3(np.eye(3), position)
-    if turn is not None and not abs(length - 1.0) < 1e-3:
+    if turn is not None and not abs(length - 1.0) < UNIT_TOLERANCE:
         raise turn.error(f"`orientation` must be a unit quaternion, but its length is {length:.4g}")
     x, y, z, w = xyzw / length
     return pin.SE3(pin.Quaternion(w, x, y, z).matrix(), position)

@@ -20,6 +20,8 @@ MAX_SPHERES = 1_000
 """Maximum number of spheres of a cloud."""
 MAX_CLOUD_POINTS = 1_000_000
 """Maximum number of points of a cloud."""
+CELL_GROWTH = 1.3
+"""Ratio of two successive edges of cells that are tried until there are few enough spheres."""
 _ORIGIN = (0.0, 0.0, 0.0)
 
 
@@ -85,9 +87,9 @@ class PointCloud(Obstacle):
     def _enough(self) -> float:
         """An edge of cells, in [m], with which the cloud has few enough spheres."""
         points = np.asarray(self.points, dtype=np.float64)
-        edge = max(float(np.ptp(points, axis=0).max()) / MAX_SPHERES, 1e-9)
+        edge = max(float(np.ptp(points, axis=0).max()) / MAX_SPHERES, MIN_LENGTH)
         while len(np.unique(np.floor(points / edge), axis=0)) > MAX_SPHERES:
-            edge *= 1.3
+            edge *= CELL_GROWTH
         return edge
 
 

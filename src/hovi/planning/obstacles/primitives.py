@@ -10,7 +10,7 @@ import pinocchio as pin
 from hovi.checks.arguments import check_arguments_except
 from hovi.errors import InputError
 from hovi.planning.obstacles.hull import hull_of
-from hovi.planning.obstacles.obstacle import Body, Obstacle, pose_of, turned_to
+from hovi.planning.obstacles.obstacle import MIN_LENGTH, Body, Obstacle, pose_of, turned_to
 from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
@@ -20,6 +20,7 @@ HALF_SPACE_SIZE = 1e3
 DRAWN_SIZE = 1.0
 """Half the edge of the slab that is drawn for a half-space, in [m]."""
 DRAWN_THICKNESS = 0.01
+"""Thickness of the slab that is drawn for a half-space, in [m]."""
 MAX_POINTS = 10_000
 """Maximum number of points of a convex hull."""
 _ORIGIN = (0.0, 0.0, 0.0)
@@ -63,7 +64,7 @@ class Capsule(Obstacle):
         super().__post_init__()
         self._keep("ends", (2, 3))
         self._keep_lengths("radius", ())
-        if np.linalg.norm(np.subtract(*np.asarray(self.ends))) <= 1e-9:
+        if np.linalg.norm(np.subtract(*np.asarray(self.ends))) <= MIN_LENGTH:
             raise InputError("the ends of a capsule coincide; use a sphere instead.")
 
     def bodies(self) -> tuple[Body, ...]:

@@ -18,6 +18,9 @@ from hovi.system.files import reason
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.int64]
 
+MOST_SHOWN = 200
+"""Number of characters of a path that a message shows."""
+
 
 @dataclass(frozen=True, eq=False)
 class TriangleMesh:
@@ -77,4 +80,4 @@ def _sorted_rows(rows: Index) -> Index:
 
 
 def _short(path: str) -> str:
-    return path if len(path) <= 200 else f"{path[:100]}...{path[-97:]}"
+    return path if len(path) <= MOST_SHOWN else f"{path[:100]}...{path[-97:]}"

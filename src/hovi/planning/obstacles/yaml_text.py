@@ -15,6 +15,8 @@ MAX_BYTES = 1_000_000
 """Maximum size of a file."""
 MAX_NODES = 200_000
 """Maximum number of values of a file."""
+MAX_DEPTH = 50
+"""Maximum number of lists and mappings inside each other."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,7 +172,7 @@ def _require_simple(events: Iterator[Any], path: Path, yaml: Any) -> None:
         if getattr(event, "anchor", None) is not None:
             line = event.start_mark.line + 1
             raise SceneError(f"{path}, line {line}: anchors (& and *) are not read; write it out.")
-        if count > MAX_NODES or depth > 50:
+        if count > MAX_NODES or depth > MAX_DEPTH:
             raise SceneError(f"{path} has too many values, or is nested too deeply.")
 
 

@@ -17,7 +17,7 @@ RESOLUTION = 0.05
 """Largest change of a joint between configurations that are looked at, in [rad]; half a link of
 1 m moves by 5 cm, and the margin is kept on both sides of an obstacle."""
 SLIDING_RESOLUTION = 0.02
-"""The same for joints that slide, in [m]."""
+"""Largest change of a sliding joint between configurations that are looked at, in [m]."""
 WIDE = np.pi
 """How far paths may leave the ends in joints whose ranges go further, in [rad] or [m]."""
 ROUNDING = 1e-9

@@ -25,6 +25,8 @@ MAX_MOTIONS = 20_000
 """Maximum number of straight motions that are looked at for one path."""
 MAX_SILENCE = 10.0
 """Time without a question or an answer after which the process counts as lost, in [s]."""
+READ_BYTES = 1 << 16
+"""Largest number of bytes that are read from the process at once."""
 _WORKER = Path(__file__).with_name("ompl_worker.py")
 
 
@@ -112,7 +114,7 @@ class OmplProcess:
                     if silence.passed:
                         raise BrokenPipeError
                     continue
-                chunk = os.read(pipe, 1 << 16)
+                chunk = os.read(pipe, READ_BYTES)
                 if not chunk:
                     raise BrokenPipeError
                 self._rest += chunk

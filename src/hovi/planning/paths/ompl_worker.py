@@ -13,6 +13,9 @@ from typing import Any
 
 from ompl import base, geometric, util
 
+SMOOTHING_STEPS = 3
+"""Maximum number of times that a path is smoothed, each by halving its parts."""
+
 
 class Asked(base.MotionValidator):  # type: ignore[misc]
     """Whether motions are free, as the other process says. count: of those that were asked."""
@@ -74,7 +77,7 @@ def found(request: dict[str, Any]) -> list[list[float]] | None:
     simplifier.reduceVertices(path)
     simplifier.partialShortcutPath(path)
     simplifier.reduceVertices(path)
-    simplifier.smoothBSpline(path, 3)
+    simplifier.smoothBSpline(path, SMOOTHING_STEPS)
     return [[state[i] for i in range(size)] for state in path.getStates()]
 
 

@@ -22,6 +22,9 @@ Mask = npt.NDArray[np.bool_]
 Lengths = Array | float
 """Of the parts, in [s], shape (p,); a number for a single one."""
 
+SAME_LENGTH = 1e-12
+"""Relative difference up to which two lengths of time are one."""
+
 
 @dataclass(frozen=True)
 class Clock:

@@ -17,6 +17,7 @@ import pinocchio as pin
 from hovi.discrete.guess import Ends
 from hovi.robot.space.joint_kinds import FLOATING, kind_of
 from hovi.scene.scene import Scene
+from hovi.scene.segmented_lagrangian import NODE_TOLERANCE
 from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
@@ -114,7 +115,7 @@ def _falling_between(
     scenes: Sequence[Scene], ends: Sequence[float], begin: float, end: float
 ) -> Scene | None:
     """The scene of a free fall between two times; None if masses or gravity change on the way."""
-    least = 1e-9 * end
+    least = NODE_TOLERANCE * end
     first = int(np.searchsorted(np.array(ends), begin + least))
     last = int(np.searchsorted(np.array(ends), end - least))
     between = scenes[first : last + 1]

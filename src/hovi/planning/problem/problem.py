@@ -40,7 +40,7 @@ from hovi.planning.conditions.condition import (
 )
 from hovi.planning.conditions.state_difference import StateDifference
 from hovi.planning.problem.along_nodes import NodeState, equations_at_nodes, sizes_of
-from hovi.planning.problem.clock import Clock, Lengths
+from hovi.planning.problem.clock import SAME_LENGTH, Clock, Lengths
 from hovi.planning.problem.conserved_momentum import Stop, kept_in_free_fall
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.goals import Via, goal_state
@@ -277,7 +277,7 @@ class TrajectoryProblem(ProblemSummary):
 
     def _with(self, ld: DiscreteLagrangian) -> TrajectoryProblem:
         grid, T = ld.grid, self.grid.duration
-        if self.equations or self.holds or abs(grid.duration - T) > 1e-12 * T:
+        if self.equations or self.holds or abs(grid.duration - T) > SAME_LENGTH * T:
             return dataclasses.replace(self, ld=ld)
         for scheme, _ in grid.groups:
             require_regular(scheme)

@@ -28,7 +28,8 @@ LAST_BARRIER = 1e-8
 """Last barrier parameter within limits where nothing else is asked for, relative to the mean
 density of the cost, which exceeds its minimum by some ten times as much."""
 BARRIER_FRACTION, LARGEST_BARRIER = 3e-3, 3e-6
-"""The same for a tolerance of the cost, as a fraction of it, and at most."""
+"""Last barrier parameter within limits for a tolerance of the cost, as a fraction of the tolerance,
+and at most."""
 FINER_FRACTIONS = 1 / 30, 1e-3, 1e-5
 """Fractions of a tolerance that are tried if a minimum satisfies it and is still not resolved."""
 REMAINING_FRACTION = 0.5

@@ -12,10 +12,13 @@ from hovi.checks.kinds import is_number, shown
 from hovi.errors import InputError, nearest
 
 LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6}
+"""Units of lengths, in [m]."""
 ANGLES = {"rad": 1.0, "mrad": 1e-3, "deg": np.pi / 180}
+"""Units of angles, in [rad]."""
 FRACTIONS = {"": 1.0, "%": 1e-2}
+"""Units of relative errors, in 1."""
 DURATIONS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0, "h": 3600.0}
-"""Units of lengths, angles, relative errors and durations, in [m], [rad], 1 and [s]."""
+"""Units of durations, in [s]."""
 _TEXT = re.compile(r"([0-9.]+(?:[eE][+-]?[0-9]+)?)\s*([^\W\d]*|%)")
 
 SECONDS_IN_WORDS = 'a positive number of seconds, or a text such as "500 ms"'

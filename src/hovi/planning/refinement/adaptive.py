@@ -12,6 +12,7 @@ import numpy as np
 
 from hovi.discrete.grid import DiscretePath, Grid
 from hovi.discrete.trajectory import Trajectory
+from hovi.optimize.criteria import MAX_ITERATIONS
 from hovi.optimize.start import Start
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.problem.tolerance import Accuracy, Round, Tolerance
@@ -40,6 +41,10 @@ OnRound = Callable[[Round], None]
 
 MAX_FIRST_INTERVALS = 60
 """Maximum number of intervals of the first grid."""
+FIRST_MODES = 4
+"""Inner modes of the intervals of the first grid of a smooth motion."""
+SMOOTH_INTERVALS = 2, 3
+"""Quotient of the intervals of the first grid of a smooth motion and those of another one."""
 RESTART_ERROR = 0.05
 """Relative error of the first cost above which the refinement begins again with more points."""
 MAX_ROUNDS = 14
@@ -68,8 +73,9 @@ def first_grid(
     number = min(intervals, MAX_FIRST_INTERVALS)
     if not smooth:
         return Grid.uniform(duration, number, galerkin_with_more_points(2, order))
-    scheme = galerkin_with_more_points(4, order) if more_points else galerkin(4, order)
-    return Grid.uniform(duration, max(2 * number // 3, 1), scheme)
+    few, many = SMOOTH_INTERVALS
+    table = galerkin_with_more_points if more_points else galerkin
+    return Grid.uniform(duration, max(few * number // many, 1), table(FIRST_MODES, order))
 
 
 @interruptible
@@ -78,7 +84,7 @@ def solve_to_tolerance(
     tolerance: Tolerance,
     guess: str | Trajectory | DiscretePath = "cubic",
     *,
-    max_iterations: int = 500,
+    max_iterations: int = MAX_ITERATIONS,
     time_limit: float | None = None,
     on_round: OnRound | None = None,
 ) -> Solution:
@@ -110,7 +116,7 @@ def refine_to_tolerance(
     solution: Solution,
     tolerance: Tolerance,
     *,
-    max_iterations: int = 500,
+    max_iterations: int = MAX_ITERATIONS,
     time_limit: float | None = None,
     on_round: OnRound | None = None,
     restart: Callable[[], Solution] | None = None,

@@ -40,18 +40,20 @@ Array = npt.NDArray[np.float64]
 LIMITED_SAFETY_FACTOR = 3.0
 """Factor on estimates under limits, where the finer solution is not much better."""
 LEAST_SAFETY_FACTOR = 2.25
-"""The least such factor for costs, where their decay is known: see FinerSolution.safety_factor.
-Larger than the 2 of a decay by one half, since kinks slow the decay down."""
+"""Least factor on estimates of costs under limits, where their decay is known: see
+FinerSolution.safety_factor. Larger than the 2 of a decay by one half, since kinks slow the decay
+down."""
 SAME_COST = 0.1
 """Largest change of a finer solution's cost when it is finished, relative to its difference from
 the coarser one, with which that difference is still used."""
 RICHER_LEVEL = 3e-4
 """Barrier parameter at which a solve with more modes begins within limits."""
 RICHER_BARRIER = 1e-7
-"""Its least last barrier parameter, which adds less to the cost than errors that can be resolved.
-"""
+"""Least last barrier parameter of a solve with more modes, which adds less to the cost than errors
+that can be resolved."""
 SAME_LEVEL = 1.1
-"""Ratio of its last barrier parameter to the wanted one up to which it needs no further steps."""
+"""Ratio of the last barrier parameter of a solve with more modes to the wanted one up to which it
+needs no further steps."""
 MAX_FINER_STEPS = 80
 """Maximum number of steps to a finer solution: one that takes more is not near."""
 

@@ -40,6 +40,10 @@ UNRESOLVED_MODES = 6
 MORE_POINTS = 4
 """Quadrature points of an interval beyond r + k while the motion is not resolved, so that the
 torque cannot vanish at the points alone."""
+ROUNDING = 1e-12
+"""Excess over a demand that is rounding, in logarithms of errors."""
+USUAL_JOINTS = 6
+"""Degrees of freedom of a robot where they are not given."""
 INFEASIBLE_PIECES = 1000
 """Number of pieces that stands for a number of modes with which the demands cannot be satisfied."""
 SPLIT_COST = 900.0
@@ -96,7 +100,7 @@ def refined(
     grid: Grid,
     rho: Array,
     demands: Sequence[Demand],
-    joints: int = 6,
+    joints: int = USUAL_JOINTS,
     decay_known: bool = True,
     few_points: bool = True,
 ) -> Grid:
@@ -136,7 +140,7 @@ def _pieces(current: Index, more: Index, rho: Array, demands: Sequence[Demand], 
     satisfied: Mask = np.ones(change.shape, dtype=bool)
     for demand in demands:
         wanted = np.log(np.minimum(demand.factor, 1.0))
-        satisfied &= demand.power * change <= wanted[:, None, None] + 1e-12
+        satisfied &= demand.power * change <= wanted[:, None, None] + ROUNDING
     possible: Mask = np.any(satisfied, axis=2)
     pieces = np.where(possible, PIECES[np.argmax(satisfied, axis=2)], INFEASIBLE_PIECES)
     infeasible = ~possible.any(axis=1)

@@ -10,7 +10,8 @@ from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.solver import Solution
 
 MIN_DISTANCE = 0.01
-"""Smallest distance of such a motion from every bound, as a fraction of the range."""
+"""Smallest distance of a motion that is far from its limits from every bound, as a fraction of the
+range."""
 
 
 def far_from_limits(solution: Solution) -> bool:

@@ -20,8 +20,10 @@ TARGET_FRACTION = 0.3
 MAX_ERROR_OF_DECAY = 1e-2
 """Relative error of the cost up to which the decay of the modes is that of the motion."""
 FINER_GRID_RATIO = 2.5
-"""Ratio of the finer solution's predicted error to that target up to which its grid is the next:
-the solution is known already, and estimating its error is cheap."""
+"""Ratio of the finer solution's predicted error to the error for which a grid is refined up to
+which its grid is the next: the solution is known already, and estimating its error is cheap."""
+WORSE_BETWEEN = 3.0
+"""Ratio of the error in an interval to that at its nodes above which the curve there is refined."""
 
 
 def next_grid(candidate: Candidate) -> Grid:
@@ -93,7 +95,7 @@ def _demands_on_curve(candidate: Candidate, finer: FinerSolution, known: Array) 
         along, ends = estimate.q.max(axis=1), estimate.q_at_nodes.max(axis=1)
     target = TARGET_FRACTION * tolerance.size
     nearby = np.maximum(ends[:-1], ends[1:])
-    own = np.where(along > 3 * nearby, along, 0.0)
+    own = np.where(along > WORSE_BETWEEN * nearby, along, 0.0)
     nodes = target / max(float(ends.max()), 1e-300)
     relative = known * len(known) / max(known.sum(), 1e-300)
     return [

@@ -18,6 +18,7 @@ from hovi.discrete.grid import DiscretePath
 from hovi.discrete.measures.motion_error import relative_difference
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import HoviError
+from hovi.optimize.criteria import MAX_ITERATIONS
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.refinement.candidate import ROUNDING_FLOOR, error_of_cost
 from hovi.planning.refinement.error_estimate import (
@@ -56,8 +57,8 @@ NEARBY = 0.05
 """Change of q, and of T v, in [rad] or [m], up to which a motion near one that passed is not
 compared with a finer one again."""
 FARTHER, GROWTH = 0.5, 2.0
-"""The same without obstacles, equations and segments while the same limits are active or, without
-any, no joint spins; and the factor on an estimate that is kept beyond NEARBY."""
+"""That change without obstacles, equations and segments while the same limits are active or,
+without any, no joint spins; and the factor on an estimate that is kept beyond NEARBY."""
 PRICE_CHANGE, LEAST_PRICE = 0.25, 0.02
 """Relative change of the price of a limit up to which it is the same one, and the least price, as a
 fraction of the cost, that this is relative to: see limit_prices."""
@@ -78,7 +79,7 @@ def solve(
     problem: TrajectoryProblem,
     guess: str | Trajectory | DiscretePath = "cubic",
     *,
-    max_iterations: int = 500,
+    max_iterations: int = MAX_ITERATIONS,
     time_limit: float | None = None,
     escape_saddles: bool = True,
     report: Report | None = None,

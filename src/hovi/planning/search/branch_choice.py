@@ -50,20 +50,21 @@ SKETCHED, SOLVED = 64, 16
 """Largest numbers of pairs of ends between which a rough motion is looked for, and of the cheapest
 among them, for which one is solved for."""
 TURNED = 4
-"""Largest number of pairs with full turns among them."""
+"""Largest number of pairs of ends with full turns among those that are compared."""
 ROUGH, FROM_ROUGH = 3, 6
 """Number of rough motions between each pair, from random bumps, and of pairs for which a motion is
 solved for from the best of them, besides that from the cubic."""
 CLEARED = 4
-"""Largest number of them that are solved for again with links kept apart."""
+"""Largest number of pairs of ends that are solved for again with links kept apart."""
 INTERVALS = 4
-"""Number of intervals of these motions."""
+"""Number of intervals of the motions by which pairs of ends are compared."""
 LAST_BARRIER = 1e-2
-"""Last barrier parameter of these motions, relative to the mean density of their cost."""
+"""Last barrier parameter of the motions by which pairs of ends are compared, relative to the mean
+density of their cost."""
 STEPS = 40
-"""Largest number of steps towards each of them."""
+"""Largest number of steps to each motion by which pairs of ends are compared."""
 CHOICE_FRACTION = 0.2
-"""Fraction of a time limit for the choice."""
+"""Fraction of a time limit for the choice of the ends."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -50,6 +50,8 @@ MAX_REFINED = 6
 MAX_FEATURE_ROUNDS, MAX_FEATURE_INTERVALS = 6, 600
 """Maximum number of grids with nodes where a minimum has narrow features, and of their intervals.
 """
+REFINING = 0.9
+"""Progress from which minima are refined, between 0 and 1."""
 LEAST_STEPS = 2
 """Number of steps on the requested grid without time for which it is not tried."""
 _Each = TypeVar("_Each")
@@ -83,7 +85,7 @@ class FinalStages:
             return self._with_their_durations(clock, found[:MAX_REFINED])
         problem = self.fine.problem()
         guesses = [guess_path(problem, s.trajectory) for s in found[:MAX_REFINED]]
-        self.progress(f"refining {len(guesses)} of {len(found)} minima", 0.9)
+        self.progress(f"refining {len(guesses)} of {len(found)} minima", REFINING)
         processes = self.fine.options.processes or default_processes()
         pool = Pool(self.fine, processes if len(guesses) > 1 else 1, self.deadline)
         solved = pool.solve_all(guesses)
@@ -94,7 +96,7 @@ class FinalStages:
 
     def _with_their_durations(self, clock: Clock, found: list[Solution]) -> list[Solution]:
         """Each on the requested grid, stretched to its duration; minima come first."""
-        self.progress(f"refining {len(found)} motions", 0.9)
+        self.progress(f"refining {len(found)} motions", REFINING)
         solve_for = self._lasting(clock, self.fine.grid)
         refined = [
             solve_for(clock.length(each.trajectory.grid), each.trajectory)
@@ -122,7 +124,7 @@ class FinalStages:
         best = found[:MAX_REFINED]
         for i, solution in enumerate(self._until_deadline(best)):
             which = f"{i + 1} of {len(best)} motions"
-            self.progress(f"best duration of {which}", 0.9)
+            self.progress(f"best duration of {which}", REFINING)
             results.append(self._with_best_duration(free, solution, which))
         return distinct(results)
 
@@ -210,7 +212,7 @@ class FinalStages:
             grid = features.seen_by(best.trajectory.grid)
             if grid.intervals > MAX_FEATURE_INTERVALS:
                 break
-            self.progress("looking at narrow features again", 0.9)
+            self.progress("looking at narrow features again", REFINING)
             job = split_for_charts(self.fine.on(grid), best.trajectory)
             again = self._solve(job, best.trajectory)
             if not again.success:
@@ -231,7 +233,7 @@ class FinalStages:
 
     def _report_round(self, which: str, done: Round) -> None:
         text = f"{which}{done.intervals} intervals, estimated error {done.error:.1e}"
-        self.progress(text, 0.9)
+        self.progress(text, REFINING)
 
     def _with_best_duration(self, free: FreeDuration, solution: Solution, which: str) -> Solution:
         """A minimum with its best duration, to the tolerance if there is one."""

@@ -42,6 +42,8 @@ MAX_STRIDE = 1.3
 """Maximum ratio of successive durations while a bracket is searched for."""
 DURATION_PRECISION = 1e-12
 """Relative tolerance of the duration."""
+LEAST_PRECISION = 4 * np.finfo(float).eps
+"""Least relative tolerance that scipy.optimize.brentq accepts."""
 SLOPE_PRECISION = 1e-10
 """Tolerance of J' + w, relative to (J + w T) / T."""
 MIN_KINK = 1e-6
@@ -331,7 +333,7 @@ class _Search:
 
         self.here = min(a, b, key=lambda each: each.total)  # in case the search is stopped
         ends = a.duration, b.duration
-        xtol, rtol = DURATION_PRECISION * min(ends), 4 * np.finfo(float).eps
+        xtol, rtol = DURATION_PRECISION * min(ends), LEAST_PRECISION
         try:
             root = float(brentq(slope_at, *ends, xtol=xtol, rtol=rtol, disp=False))
             slope_at(root)

@@ -22,6 +22,9 @@ from hovi.scene.scene import Scene
 Array = npt.NDArray[np.float64]
 Goal = TypeVar("Goal")
 
+MOVED = 1e-9
+"""Change of a coordinate above which a goal moves its joint, in [rad] or [m]."""
+
 
 def in_group(
     scene: Scene, group: str, start: State | FrameGoal, goal: State | FrameGoal
@@ -49,7 +52,7 @@ def in_group(
     for joint in others:
         part = robot.entries_of(joint)
         moved = goal.on(robot, "goal")[0] if isinstance(goal, State) else q
-        if np.abs(robot.difference(q, moved)[part]).max() > 1e-9:
+        if np.abs(robot.difference(q, moved)[part]).max() > MOVED:
             raise InputError(
                 f"joint {joint!r} is not in group {group!r}, and the goal moves it: give it the "
                 "position of the start, or leave the group out."

@@ -30,7 +30,7 @@ from hovi.planning.search.options import PlanOptions
 from hovi.planning.solver.initial_path import guess_path
 from hovi.scene.lagrangian import Lagrangian
 from hovi.scene.scene import Scene
-from hovi.scene.segmented_lagrangian import SegmentedLagrangian
+from hovi.scene.segmented_lagrangian import NODE_TOLERANCE, SegmentedLagrangian
 from hovi.schemes import is_galerkin, of_order
 from hovi.system.dataclass import dataclass
 
@@ -119,7 +119,7 @@ class Job:
         between = [
             time
             for time in stops_of(self.options)
-            if all(abs(time - end) > 1e-9 * T for end in (*ends, T))
+            if all(abs(time - end) > NODE_TOLERANCE * T for end in (*ends, T))
         ]
         return sorted([*between, *ends])
 
@@ -287,7 +287,7 @@ def grid_of(T: float, options: PlanOptions, scene: Scene, free: bool) -> Grid:
         few = options.starts == 1 and not free and not isinstance(guess, Trajectory)
         number, order = options.interval_count, scene.order
         grid = first_grid(T, number, not kinks, more_points=not few, order=order)
-    stops = [time for time in stops_of(options) if abs(time - T) > 1e-9 * T]
+    stops = [time for time in stops_of(options) if abs(time - T) > NODE_TOLERANCE * T]
     return grid.with_nodes(stops, options.intervals is None)
 
 

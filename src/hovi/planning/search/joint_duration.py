@@ -42,8 +42,9 @@ LARGEST_SLOPE = 1e-7
 """Largest slope J' + w, relative to w, of a motion that is called a minimum, unless its duration is
 at a bound, at the edge of feasibility or next to a jump of the cost."""
 SLOPE_AMONG_OBSTACLES = 1e-5
-"""The same where distances are bounded, at instants that change with the duration: a duration that
-is off by as much costs 1e-11 more."""
+"""Largest slope J' + w of a motion that is called a minimum, relative to w, where distances are
+bounded, at instants that change with the duration: a duration that is off by as much costs 1e-11
+more."""
 SMALL_WEIGHT, SLOPE_OF_SMALL_WEIGHT = 1e-2, 1e-4
 """Weight w, relative to J / T, up to which the cost of the motion alone decides, and the largest
 slope then, relative to J / T: a duration longer by one percent costs less by 1e-6 at most."""

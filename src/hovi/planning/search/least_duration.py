@@ -26,7 +26,12 @@ UNCHANGED = 1e-3
 EFFORT_FRACTION = 1e-2
 """Once the effort is less than this fraction of w T, its weight is only halved."""
 LARGEST_JUMP, LEAST_JUMP = 30.0, 2.0
-"""Largest factor of the weight of time before that, and the least, which halves the effort's."""
+"""Largest factor from one weight of time to the next while the effort is more than EFFORT_FRACTION
+of w T, and the least one, which halves the weight of effort."""
+ROUNDING = 1e-9
+"""Relative rounding error of a factor of the weight of time."""
+NO_TIME = 1e-3
+"""Time limit of a solve for which no time is left, in [s]: it ends with its status."""
 MAX_SOLVES = 60
 """Maximum number of weights."""
 
@@ -80,7 +85,7 @@ class _Search:
             tried = self._solved(weight, best.trajectory)
             if tried.status in (Status.TIME_LIMIT, Status.INTERRUPTED):
                 return self._stopped(best, tried.status)
-            halved = 0 < weight <= LEAST_JUMP * self.weight * (1 + 1e-9)
+            halved = 0 < weight <= LEAST_JUMP * self.weight * (1 + ROUNDING)
             if tried.success:
                 change = abs(tried.trajectory.duration / best.trajectory.duration - 1)
                 self.changes = [*self.changes, change] if halved else []
@@ -105,7 +110,7 @@ class _Search:
         changes: dict[str, object] = {"objective": "effort", "time_weight": weight}
         changes["time_limit"] = left = self.deadline.seconds_left
         if left is not None and left <= 0:
-            changes["time_limit"] = 1e-3  # the solve ends with its status
+            changes["time_limit"] = NO_TIME
         if guess is not None:
             changes |= {"guess": guess, "starts": 1}
         found = self.planned(self.options.with_changes(**changes))

@@ -40,6 +40,10 @@ Array = npt.NDArray[np.float64]
 
 STARTS_PER_ROUND = 16
 """Starts per round; constant, so that results do not depend on the number of processes."""
+SEED_STRIDE = 100_003
+"""Difference of the first seeds of two searches whose seeds differ by one; a prime."""
+TURNS, TURN_PROBABILITIES = (-1.0, 0.0, 1.0), (0.15, 0.7, 0.15)
+"""Full turns that a start adds to a continuous joint, and how probable each is."""
 PERTURBED_MINIMA = 4
 """Number of minima that a round perturbs."""
 COMPARED_TIMES = 17
@@ -350,9 +354,9 @@ def _round(
     guesses = []
     for i in range(done, min(done + STARTS_PER_ROUND, starts)):
         base = stretched(bases[i % len(bases)], T, problem.ld.k)
-        curve = with_bump(base, robot, T, seed=seed * 100_003 + i)
+        curve = with_bump(base, robot, T, seed=seed * SEED_STRIDE + i)
         if robot.space.angles:
-            turns = _random_turns(robot, seed * 100_003 + i)
+            turns = _random_turns(robot, seed * SEED_STRIDE + i)
             for goal in problem.goals:
                 turns[says_turns(goal, robot)] = 0.0
             curve = with_turns(curve, robot, T, turns)
@@ -373,7 +377,7 @@ def _random_turns(robot: Robot, seed: int) -> Array:
     random = np.random.default_rng([seed, 1])
     turns = np.zeros(robot.nv)
     for factor in robot.space.angles:
-        turns[factor.v] = random.choice([-1.0, 0.0, 1.0], p=[0.15, 0.7, 0.15])
+        turns[factor.v] = random.choice(TURNS, p=TURN_PROBABILITIES)
     return turns
 
 

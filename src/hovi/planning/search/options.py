@@ -13,6 +13,7 @@ from hovi.checks.arguments import check_arguments_except
 from hovi.discrete.guess import require_guess
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError, expect, nearest
+from hovi.optimize.criteria import MAX_ITERATIONS
 from hovi.planning.clearance.clearance import DEFAULT_MARGIN, Clearance
 from hovi.planning.conditions.asked import as_conditions
 from hovi.planning.conditions.condition import Condition
@@ -197,7 +198,7 @@ class PlanOptions:
         "are at the start, and the motion is that of a robot without them.",
     )
     max_iterations: int = whole_number(
-        500,
+        MAX_ITERATIONS,
         "maximum number of steps of a solve; with limits, of each of its rounds.",
         least=1,
         key=SceneKey("a whole number, 1 or more"),

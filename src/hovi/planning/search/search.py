@@ -23,6 +23,7 @@ from hovi.planning.search.branch_choice import Ends
 from hovi.planning.search.continuation import STOPPED, UNUSABLE, may_help, solve_by_continuation
 from hovi.planning.search.final_stages import (
     MAX_REFINED,
+    REFINING,
     FinalStages,
     ended_early,
     has_few_points,
@@ -50,6 +51,8 @@ EXPLORATION_FRACTION = 0.7
 """Fraction of the time limit for the exploration, if its minima are refined afterwards."""
 SOLVING_FRACTION = 0.9
 """Fraction of the time limit for solving, if a finer grid is compared afterwards."""
+COMPARING = 0.95
+"""Progress from which a finer grid is compared, between 0 and 1."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +107,7 @@ class Search:
         ends = self.ends.cheaper_clear(cost, self.deadline)
         if ends is None:
             return best, costs
-        self.progress("from another configuration at the goal", 0.9)
+        self.progress("from another configuration at the goal", REFINING)
         other = dataclasses.replace(self, ends=ends, fine=self.fine.to(ends.goal))
         found, further = other._run()
         return (found, further) if found.success and found.cost < cost else (best, costs)
@@ -225,7 +228,7 @@ class Search:
         """The minima from the cheapest resolved one on; the cheapest of all if none is resolved."""
         checked: list[Solution] = []
         if found[0].success:
-            self.progress("comparing with a finer grid", 0.95)
+            self.progress("comparing with a finer grid", COMPARING)
         for i, solution in enumerate(found[:MAX_REFINED]):
             problem = solution.problem or on_grid_of(self.fine.problem(), solution)
             known = dataclasses.replace(solution, problem=problem)

@@ -41,8 +41,9 @@ MAX_CHART_TURN = 1.4 * np.pi
 TORQUE_FLOOR = 1e-4
 """Lower bound of the torque scale for residuals, as a fraction of the inertial torque M / T^2."""
 ROUNDING_FLOOR = 2e-5
-"""The same as a fraction of |d tau/dq| |q|, and with charts of M |q| / h^2: rounding moves torques
-by 5e-16 of it, and the equations of passive joints are solved to 1e-10 of the torque scale."""
+"""Lower bound of the torque scale for residuals, as a fraction of |d tau/dq| |q|, and with charts
+of M |q| / h^2: rounding moves torques by 5e-16 of it, and the equations of passive joints are
+solved to 1e-10 of the torque scale."""
 MAX_BAND_INTERVALS = 1000
 """Maximum number of intervals for the nodal band matrix; its condition number grows like N^4."""
 

@@ -26,7 +26,9 @@ from hovi.scene.lagrangian import PointTerms
 Array = npt.NDArray[np.float64]
 
 PENALTY = 3e5
-"""`penalty`, relative to the mean weight of the other joints' torques."""
+"""Penalty of |c|^2 in the model, relative to the mean weight of the other joints' torques."""
+LEAST_PENALTY = 1e-6
+"""Least penalty of conditions, per [rad^2] or [m^2]."""
 
 # called at each step
 _expand = without_checks(DiscreteLagrangian.expand)
@@ -53,7 +55,7 @@ class ConstrainedAction(EqualityObjective[DiscretePath]):
         cost = abs(self.problem.ld.action(path))
         expansion = _expand(self.problem.ld, path, "nodal", None, None, self.action.jets(path))
         largest = float(np.max(np.abs(expansion.hessian)))
-        return max(CONDITION_PENALTY * cost, largest, 1e-6)
+        return max(CONDITION_PENALTY * cost, largest, LEAST_PENALTY)
 
     @cached_property
     def negligible(self) -> float:

@@ -13,6 +13,8 @@ TORQUE_PENALTY = 10.0
 """Penalty of passive torques, relative to the mean weight of the other joints."""
 CONDITION_PENALTY = 1e3
 """Penalty of conditions, relative to the cost, per [rad^2] or [m^2]."""
+LEAST_COST = 1e-6
+"""Least cost that penalties are relative to."""
 
 
 def first_multipliers(problem: TrajectoryProblem, path: DiscretePath) -> Multipliers:
@@ -31,4 +33,4 @@ def first_penalty(problem: TrajectoryProblem, path: DiscretePath) -> float:
 
 
 def _cost(problem: TrajectoryProblem, path: DiscretePath) -> float:
-    return max(abs(problem.ld.action(path)), 1e-6)
+    return max(abs(problem.ld.action(path)), LEAST_COST)

@@ -24,9 +24,9 @@ Array = npt.NDArray[np.float64]
 LEAST_VIOLATION_PENALTY = 1e6
 """Penalty, relative to the mean density of the action, at which the violation outweighs it."""
 STALLED = 0.1
-"""Fraction by which some steps have to decrease it; else it is near its least value."""
+"""Fraction by which some steps have to decrease the violation; else it is near its least value."""
 MAX_STEPS = 40
-"""Maximum number of steps."""
+"""Maximum number of steps to the least violation."""
 OUTWEIGHED = 0.5
 """Fraction of the action in the penalized one below which the limits count as impossible."""
 

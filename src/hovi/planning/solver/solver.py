@@ -23,7 +23,7 @@ from hovi.discrete.measures.motion_segments import with_segment_names
 from hovi.discrete.state import Periodic
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError
-from hovi.optimize.criteria import Criteria
+from hovi.optimize.criteria import MAX_ITERATIONS, Criteria
 from hovi.optimize.ended import Iteration, Reason
 from hovi.optimize.quadratic_model import QuadraticModel
 from hovi.optimize.start import Start
@@ -382,7 +382,7 @@ def solve_on_grid(
     problem: TrajectoryProblem,
     guess: str | Trajectory | DiscretePath | Start[Any, Any] = "cubic",
     *,
-    max_iterations: int = 500,
+    max_iterations: int = MAX_ITERATIONS,
     time_limit: float | None = None,
     escape_saddles: bool = True,
     report: Report | None = None,

@@ -17,6 +17,8 @@ from hovi.system.dataclass import dataclass
 
 Keys = tuple[str | int, ...]
 
+MOST_SHOWN = 60
+"""Number of characters of a value that a message shows."""
 _HEADER = re.compile(r"(\[\[?)([^\]]+)\]\]?\s*(#.*)?$")
 _ELEMENTS = {
     "finite_number": "a finite number",
@@ -107,14 +109,14 @@ def spelled(keys: Iterable[str | int]) -> str:
 
 
 def in_toml(value: Any) -> str:
-    """A value in TOML syntax, truncated to 60 characters."""
+    """A value in TOML syntax, truncated to MOST_SHOWN characters."""
     if isinstance(value, bool):
         return str(value).lower()
     try:
         text = f'"{value}"' if isinstance(value, str) else f"{value}"
     except ValueError:  # Python converts at most 4,300 digits
         return "a number of too many digits"
-    return text if len(text) <= 60 else text[:57] + "..."
+    return text if len(text) <= MOST_SHOWN else text[:57] + "..."
 
 
 def _expected(model: type[BaseModel], keys: Keys, details: ErrorDetails) -> str:

@@ -26,15 +26,17 @@ Array = npt.NDArray[np.float64]
 PATIENCE = 60
 """Seeds in a row without a new configuration after which the search ends."""
 PYTHON_PATIENCE = 8
-"""The same where the search runs in Python."""
+"""Seeds in a row without a new configuration after which a search in Python ends."""
 GOAL_TOLERANCE = 1e-9
 """Largest distance [m] and angle [rad] of a configuration that reaches a goal."""
 PYTHON_TOLERANCE = 1e-6
-"""The same where the search runs in Python, which may not come closer where J is singular."""
+"""Largest distance [m] and angle [rad] of a configuration that a search in Python reaches a goal
+with; it may not come closer where J is singular."""
 ISOLATED = 1e-3
-"""Configurations that differ less in every joint are one, in [rad] or [m], ..."""
+"""Difference of every joint below which two configurations are one, in [rad] or [m]."""
 IN_A_FAMILY = 0.3
-"""... and where the joints are more than the equations, so that configurations form families."""
+"""Difference of every joint below which two configurations are one, in [rad] or [m], where the
+joints are more than the equations, so that configurations form families."""
 LENGTH = 0.5
 """A distance by it counts as an angle of 1 rad in the search, in [m]."""
 BEYOND_REACH = 64

@@ -20,10 +20,16 @@ Array = npt.NDArray[np.float64]
 
 MAX_SEEDS = 160
 """Maximum number of random seeds after the first."""
+SPREAD = 0.2
+"""Increase of the spread of random seeds about the first from one to the next, up to 1 rad or m."""
 MAX_ITERATIONS = 100
 """Maximum number of steps per seed."""
 RESIDUAL_TOLERANCE = 1e-13
 """Largest component of the residual at convergence, in [m] or [rad]."""
+FIRST_DAMPING, LEAST_DAMPING = 1e-2, 1e-14
+"""Damping that is added to the diagonal of J J^T, at first and at least."""
+DAMPING_DECREASE, DAMPING_GROWTH = 0.2, 8.0
+"""Factors on the damping after a step that decreases the residual and after another one."""
 MAX_STEP = 0.5
 """Maximum step of a joint, in [rad] or [m]."""
 STALL_RATIO = 0.98
@@ -54,7 +60,8 @@ def seeds(robot: Robot, near: Array, lower: Array, upper: Array) -> Iterator[Arr
     middle, half = (low + high) / 2, (high - low) / 2
     for i in range(MAX_SEEDS):
         if i % 2 == 0 or not robot.vector_joints:
-            yield robot.integrate(near, random.uniform(-1, 1, robot.nv) * min(1.0, 0.2 * (i + 1)))
+            spread = min(1.0, SPREAD * (i + 1))
+            yield robot.integrate(near, random.uniform(-1, 1, robot.nv) * spread)
         else:
             yield middle + half * random.uniform(-1, 1, robot.nv)
 
@@ -71,7 +78,7 @@ def _newton(robot: Robot, off: PoseDifference, q: Array, lower: Array, upper: Ar
     """Levenberg-Marquardt steps, clipped to the limits."""
     v = np.zeros(robot.nv)
     c, J = linear(off, q, v)
-    damping, stalled = 1e-2, 0
+    damping, stalled = FIRST_DAMPING, 0
     for _ in range(MAX_ITERATIONS):
         if np.max(np.abs(c)) <= RESIDUAL_TOLERANCE:
             break
@@ -83,7 +90,10 @@ def _newton(robot: Robot, off: PoseDifference, q: Array, lower: Array, upper: Ar
         ratio = np.linalg.norm(new) / np.linalg.norm(c)
         if ratio < 1.0:
             q, c, J = candidate, new, slope
-        damping = max(0.2 * damping, 1e-14) if ratio < 1.0 else 8.0 * damping
+        if ratio < 1.0:
+            damping = max(DAMPING_DECREASE * damping, LEAST_DAMPING)
+        else:
+            damping *= DAMPING_GROWTH
         stalled = stalled + 1 if ratio > STALL_RATIO else 0
         if stalled >= MAX_STALLED_STEPS:
             break

@@ -10,6 +10,8 @@ from hovi.scene.scene import Scene, without_inertia
 
 SAMPLES = 257
 """Number of samples of a motion at which the force on a base is compared."""
+PLAUSIBLE_EFFORT = 1e6
+"""Effort limit from which a URDF means none, in [N] or [N m]."""
 
 REPLACED_WEIGHT = "The option weight takes the place of the scene's effect 'effort_weight'."
 
@@ -68,7 +70,7 @@ def _forces_beside_torques(scene: Scene) -> list[str]:
         return []
     names = [robot.coordinate_names[int(np.flatnonzero(each)[0])] for each in (forces, torques)]
     limits, chosen = robot.effort_limit, forces | torques
-    known = (limits[chosen] > 0).all() and (limits[chosen] < 1e6).all()
+    known = (limits[chosen] > 0).all() and (limits[chosen] < PLAUSIBLE_EFFORT).all()
     how = (
         "hovi.effects.EffortWeight(from_urdf=True) or, in a scene file, "
         "[effects.effort_weight] from_urdf = true divides each by its effort limit"

@@ -34,8 +34,8 @@ HUGE, THICK = 50.0, 2.0
 """Length and thickness of an obstacle, in [m], from which both may have been meant in millimetres:
 floors and walls are thinner."""
 FAR_CENTER = 5.0
-"""Distance of a payload's center from its frame that is as suspicious, in [m]; and the size of what
-a gripper holds."""
+"""Distance of a payload's center from its frame, and size of what a gripper holds, from which they
+may have been meant in millimetres, in [m]."""
 
 
 def length_slips(scene: Scene, clearance: Clearance, q: Sequence[Array]) -> Iterator[str]:

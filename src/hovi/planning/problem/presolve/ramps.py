@@ -30,7 +30,8 @@ TIGHT = 0.8
 GRADES = 2.0 ** np.arange(-2, 12)
 """Times of nodes, as multiples of a ramp, until they are as far apart as those of the grid."""
 SMOOTH_GRADES = np.sort([*2.0 ** np.arange(-3, 12), 0.75, 0.875])
-"""The same where the acceleration is continuous, and has to vanish after a ramp as well."""
+"""Times of nodes, as multiples of a ramp, where the acceleration is continuous, and has to vanish
+after a ramp as well."""
 CLOSE = 1e-6
 """Two nodes are one if they are nearer than this fraction of the duration."""
 NEAR = 0.1

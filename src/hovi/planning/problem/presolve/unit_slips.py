@@ -7,10 +7,13 @@ from collections.abc import Iterator
 import numpy as np
 import pinocchio as pin
 
+from hovi.planning.problem.presolve.frame_hints import MILLIMETRE
 from hovi.planning.problem.presolve.length_slips import payloads_of
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.scene.scene import Scene
 
+MILLISECOND, GRAM = 1e-3, 1e-3
+"""A millisecond, in [s], and a gram, in [kg]."""
 MILLISECONDS_FROM = 100.0
 """Duration from which it may have been meant in milliseconds, in [s]."""
 PLAUSIBLE_SPEED = 10.0
@@ -39,10 +42,10 @@ def long_durations(problem: TrajectoryProblem) -> Iterator[str]:
         return
     with np.errstate(divide="ignore"):
         least = float((distance[moving] / speed[moving]).max())
-    if least <= 1e-3 * T:
+    if least <= MILLISECOND * T:
         yield (
-            f"the duration of {T:g} s looks like milliseconds, which are {1e-3 * T:g} s: at the "
-            f"velocity limits the joints take {least:.2g} s."
+            f"the duration of {T:g} s looks like milliseconds, which are {MILLISECOND * T:g} s: at "
+            f"the velocity limits the joints take {least:.2g} s."
         )
 
 
@@ -53,8 +56,8 @@ def heavy_loads(scene: Scene) -> Iterator[str]:
         if payload.mass > GRAMS_RATIO * own > 0.0:
             yield (
                 f"the payload of {payload.mass:g} kg looks like grams, which are "
-                f"{1e-3 * payload.mass:g} kg: the robot's moving links weigh {own:.3g} kg."
+                f"{GRAM * payload.mass:g} kg: the robot's moving links weigh {own:.3g} kg."
             )
     g = float(np.linalg.norm(scene.model.gravity.linear))
     if g > MILLIMETRES_GRAVITY:
-        yield f"a gravity of {g:g} m/s^2 looks like mm/s^2, which is {1e-3 * g:g} m/s^2."
+        yield f"a gravity of {g:g} m/s^2 looks like mm/s^2, which is {MILLIMETRE * g:g} m/s^2."

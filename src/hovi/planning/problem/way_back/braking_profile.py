@@ -15,6 +15,10 @@ from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 
+FOREVER = 1e30
+"""Time that stands for a ramp without end, in [s]."""
+ROUNDING = 1e-9
+"""Excess over a polynomial that is rounding, relative to its largest term."""
 SAMPLES = 65
 """Number of times at which profiles are compared."""
 
@@ -40,7 +44,7 @@ class BrakingProfile:
             return np.full(len(t), -np.inf)
         if self.rank == 0:
             return self.now - self.jerk * t
-        begin = min(self._ramp, 1e30)
+        begin = min(self._ramp, FOREVER)
         ramp, after = np.minimum(t, begin), np.maximum(t - begin, 0.0)
         a0, J, A = self._first, self._finite_jerk, self.acceleration
         A = 0.0 if np.isinf(A) else A  # which a ramp without end never reaches
@@ -102,5 +106,5 @@ def is_below(profile: BrakingProfile, powers: Sequence[float], time: float) -> b
     """Whether a profile is at most a polynomial until a time, in [s]."""
     t = np.linspace(0.0, time, SAMPLES)[1:]
     e = np.polynomial.polynomial.polyval(t, powers)
-    room = 1e-9 * max(abs(x) * time**j for j, x in enumerate(powers))
+    room = ROUNDING * max(abs(x) * time**j for j, x in enumerate(powers))
     return bool((profile.at(t) <= e + room).all())

@@ -18,6 +18,8 @@ from hovi.system.dataclass import dataclass
 Array = npt.NDArray[np.float64]
 
 KINDS = tuple(QUANTITIES)
+ROUNDING = 1e-12
+"""Relative rounding error of a time."""
 MOST_POWERS = 4
 """Number of coefficients of a polynomial at most: of the third degree for positions of order 3."""
 
@@ -67,7 +69,7 @@ class Excused:
         begin, length: of the parts, shape (M,), in [s].
         """
         points = np.zeros((len(begin), degree + 1))
-        inside = begin + length <= self.until * (1.0 + 1e-12)
+        inside = begin + length <= self.until * (1.0 + ROUNDING)
         e = np.polynomial.Polynomial(self.powers)
         for j in range(min(len(self.powers), degree + 1)):
             local = e.deriv(j)(begin[inside]) * length[inside] ** j if j else e(begin[inside])

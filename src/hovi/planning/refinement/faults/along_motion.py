@@ -37,6 +37,7 @@ Index = npt.NDArray[np.intp]
 MAX_CELLS = 20_000
 """Maximum number of cells of a motion."""
 _RULES = [np.polynomial.legendre.leggauss(points) for points in (4, 6)]
+"""Gauss points in [-1, 1] and weights of two rules, whose difference is the error of the first."""
 _S = np.concatenate([(x + 1) / 2 for x, _ in _RULES])
 """The points of both rules in [0, 1]."""
 

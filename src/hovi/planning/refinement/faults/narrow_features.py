@@ -30,7 +30,7 @@ Array = npt.NDArray[np.float64]
 ESTIMATE_FRACTION = 0.05
 """Error that the integral along the curve may have, relative to the estimate of the cost's."""
 LEAST_ERROR = 1e-8
-"""Least such error, relative to the cost."""
+"""Least error that the integral along the curve may have, relative to the cost."""
 NARROW = "narrow features"
 """What the reasons of faults name."""
 

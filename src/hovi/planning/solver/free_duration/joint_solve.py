@@ -9,12 +9,12 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.discrete.grid import DiscretePath, Grid
-from hovi.optimize.criteria import Criteria
+from hovi.optimize.criteria import MAX_ITERATIONS, Criteria
 from hovi.optimize.ended import Ended, Reason
 from hovi.optimize.start import Start
 from hovi.optimize.trust_region import minimize
 from hovi.planning.conditions.condition import Equation
-from hovi.planning.problem.clock import Clock
+from hovi.planning.problem.clock import SAME_LENGTH, Clock
 from hovi.planning.problem.contradictions import contradiction
 from hovi.planning.problem.limits import Limits, no_limits
 from hovi.planning.problem.problem import TrajectoryProblem
@@ -83,7 +83,7 @@ def solve_jointly(
     price: TimePrice,
     lengths: Array,
     *,
-    max_iterations: int = 500,
+    max_iterations: int = MAX_ITERATIONS,
     time_limit: float | None = None,
     escape_saddles: bool = True,
     near: bool = False,
@@ -122,7 +122,7 @@ def _within(
 ) -> tuple[TrajectoryProblem, DiscretePath, Array]:
     """The problem and the guess for the nearest lengths within the bounds, and these."""
     lengths, clock = np.clip(before, price.lower, price.upper), price.clock
-    if np.allclose(lengths, before, rtol=1e-12, atol=0.0):
+    if np.allclose(lengths, before, rtol=SAME_LENGTH, atol=0.0):
         return problem, problem.moved(path), lengths
     first = problem.lasting(clock, before, lengths)
     moved = first.moved(stretched_path(path, problem.grid, clock, before, lengths))
@@ -167,7 +167,7 @@ def _limited(
     deadline = Deadline(criteria.time_limit)
     found, lengths = minimum_within_limits(problem, limits, start, price, lengths, criteria)
     bounds = np.stack([price.lower, price.upper])
-    kept = np.any(np.isclose(lengths, bounds, rtol=1e-12, atol=0.0), axis=0)
+    kept = np.any(np.isclose(lengths, bounds, rtol=SAME_LENGTH, atol=0.0), axis=0)
     if not kept.any() or found.status is not Status.MINIMUM:
         return found
     # as for given lengths: the barrier was relative to the cost with their price

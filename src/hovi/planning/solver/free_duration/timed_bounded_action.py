@@ -34,7 +34,9 @@ class TimedBoundedAction(BoundedObjective[TimedPath]):
     keep those at the points from now on. price: of time. lengths: L0, in [s].
     """
 
-    radii = 20.0, 20.0  # a long step in time leads to another motion
+    radii = 20.0, 20.0
+    """First radius of the trust region, in a cold start and in a warm one: a long step in time
+    leads to another motion."""
 
     def __init__(self, first: BoundedAction, price: TimePrice, lengths: Array) -> None:
         first.action.keep_points = True

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from hovi.discrete.grid import Grid
 from hovi.planning.conditions.joint_quantity import DERIVATIVES
 from hovi.planning.problem.limits import Limits
+from hovi.planning.problem.way_back.excused import ROUNDING
 from hovi.planning.solver.limits.limited_coordinates import LimitedCoordinates
 from hovi.planning.solver.limits.limited_parts import LimitedParts
 
@@ -35,7 +36,7 @@ def _short_across(parts: LimitedParts, grid: Grid, coordinate: int, until: float
     while True:
         h = grid.steps[parts.k]
         begin, length = grid.t[parts.k] + h * parts.left, h * parts.width
-        across = (begin < until) & (begin + length > until * (1.0 + 1e-12))
+        across = (begin < until) & (begin + length > until * (1.0 + ROUNDING))
         long = (parts.coordinate == coordinate) & across & (length > SHORT * until)
         if not long.any():
             return parts

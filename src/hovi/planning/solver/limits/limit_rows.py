@@ -48,9 +48,13 @@ LEAST_LOSS = 1e-7
 """Rise of the cost by the distance of one control point, as a fraction of the cost, below
 which its part is not halved."""
 MAX_LOSS = 1e-5
-"""Rise of the cost by all of them, as a fraction of the cost, below which none is."""
+"""Rise of the cost by the distances of all control points, as a fraction of the cost, below which
+no part is halved."""
 LOSS_RATIO = 20.0
-"""The same, relative to the last barrier parameter of the solve, if that is larger."""
+"""Rise of the cost by the distances of all control points, relative to the last barrier parameter
+of the solve, below which no part is halved, if that is more than MAX_LOSS."""
+LEAST_SLACK = 1e-12
+"""Least slack of a control point whose force is estimated, as a fraction of the range."""
 MAX_HALVINGS = 4
 """Number of times that a part is halved at once."""
 
@@ -225,7 +229,7 @@ class LimitRows:
         """Which parts are worth halving, shape (L,)."""
         y, (lower, upper) = self.values(path), self.bounds
         outside = push_rows(self, self._beyond, self._data(path))
-        slack = np.maximum(np.where(outside > 0, upper - y, y - lower), 1e-12)
+        slack = np.maximum(np.where(outside > 0, upper - y, y - lower), LEAST_SLACK)
         gap, force = np.abs(outside), level / slack
         loss = self.weights / self.grid.duration * force * gap
         coarse = np.zeros(len(self.parts), dtype=bool)

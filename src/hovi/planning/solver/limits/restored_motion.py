@@ -12,7 +12,7 @@ from hovi.discrete.grid import DiscretePath
 from hovi.discrete.guess import stretched, with_bump
 from hovi.errors import ChartError
 from hovi.optimize.barrier import Barrier
-from hovi.optimize.ended import STOPPED, Ended, Outputs, Reason
+from hovi.optimize.ended import LEAST_VALUE, STOPPED, Ended, Outputs, Reason
 from hovi.optimize.start import Start
 from hovi.optimize.trust_region import minimize
 from hovi.planning.solver.bounded_action import BoundedAction
@@ -34,7 +34,7 @@ PENALTY_DECREASE = 0.9
 BUMPED_GUESSES = 1
 """Number of perturbed guesses that are tried before limits are reported as infeasible."""
 SAME_VIOLATION = 1.5
-"""Ratio of the squares up to which two minima of the violation are taken as one."""
+"""Ratio of the squared violations of two motions of least violation up to which they are one."""
 BUMP_FRACTION = 0.3
 """Fraction of a perturbation of the guess that keeps it near enough for few steps."""
 BUMP_HALVINGS = 8
@@ -53,7 +53,7 @@ def locally_infeasible(search: BoundedSearch, ended: Bounded) -> str:
     if search.free_duration:
         return ""
     rows, search.rows = search.rows, search.fine_rows()
-    cost = max(abs(problem.ld.action(ended.x)), 1e-12)
+    cost = max(abs(problem.ld.action(ended.x)), LEAST_VALUE)
     penalty = LEAST_VIOLATION_PENALTY * cost / problem.grid.duration
     known = first_multipliers(problem, ended.x) if problem.constrained else None
     objective = search.objective(known)

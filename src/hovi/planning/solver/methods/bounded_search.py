@@ -61,7 +61,8 @@ Begun = Start[DiscretePath, Barrier]
 FIRST_HALVINGS = 0, 1
 """Number of halvings of intervals for limits on positions, and on their derivatives."""
 FINE_HALVINGS = 2, 3
-"""The same where a motion within such limits was not found."""
+"""Number of halvings of intervals for limits on positions, and on their derivatives, where no
+motion within those of FIRST_HALVINGS was found."""
 WARM_MU_RANGE = 1e-7, 1e-4
 """Range of the initial barrier parameter of a warm start, relative to the mean density."""
 LEVEL_MARGIN = 0.1
@@ -69,7 +70,7 @@ LEVEL_MARGIN = 0.1
 EXACT_TOLERANCES = TORQUE_TOLERANCE, CONDITION_TOLERANCE
 """Residuals of equations at the end of a solve: see BoundedAction."""
 ROUGH_TOLERANCES = np.inf, 1e-4
-"""The same for a rough solve."""
+"""Residuals of equations at the end of a rough solve: see BoundedAction."""
 LOOK_AROUND = 0.02
 """Distance beyond the least one up to which pairs near a known motion get rows, in [m]."""
 

@@ -24,15 +24,15 @@ from hovi.system.deadline import raise_if_late
 AHEAD = 0.06
 """Distance beyond the least one up to which pairs get rows at first, in [m]."""
 KEPT = 0.03
-"""Distance beyond the least one up to which they keep their rows after a rough motion, in [m]."""
+"""Distance beyond the least one up to which pairs keep their rows after a rough motion, in [m]."""
 FIRST_MU = 0.1
 """First barrier parameter from a motion that was moved, relative to the cost's mean density."""
 ROUGH_STEPS = 100
-"""Maximum number of its steps."""
+"""Maximum number of steps from a motion that was moved to a rough one."""
 ROUGH_VIOLATION = 0.05
 """Largest violation of a bound, relative to its range, from which a rough motion is solved on."""
 DETOUR = 1.05
-"""Cost of a rough motion, relative to that of one without distances, above which it is one."""
+"""Cost of a rough motion, relative to that of one without distances, above which it is a detour."""
 
 
 def cleared_motion(search: BoundedSearch, guess: DiscretePath) -> Bounded:

@@ -23,16 +23,19 @@ the objective: a larger one moves it away from its bounds, and perhaps to anothe
 SHIFT_LEVEL = 1.0
 """Barrier parameter where a moved problem is begun, relative to the largest move of an output."""
 SHIFT_LEVELS = 1e-5, 3e-2
-"""Least and largest such parameter."""
+"""Least and largest barrier parameter where a moved problem is begun, relative to the mean
+density."""
 WARM_SHIFT = 1e-3
 """Largest move of an output, as a fraction of its range, for a start at the old solution."""
 NEWTON_SHIFT, NEWTON_STEPS = 0.1, 20
-"""The same for whole Newton steps, and the maximum number of these."""
+"""Largest move of an output, as a fraction of its range, for whole Newton steps from the old
+solution, and the maximum number of these."""
 WARM_BARRIER, WARM_DECREASE = 1e-7, 3e-7
-"""Its barrier parameter, and the predicted decrease at which it ends, relative to the cost: the
-cost exceeds its minimum by less than 1e-6."""
+"""Least last barrier parameter of a solve from the old solution, relative to the mean density, and
+the predicted decrease at which it ends, relative to the cost: the cost exceeds its minimum by less
+than 1e-6."""
 WARM_MARGIN = 1e-6
-"""Least distance of its slacks from their bounds."""
+"""Least distance of the slacks of a solve from the old solution from their bounds."""
 WARM_STEPS = 100
 """Maximum number of steps from a motion that nearly is a solution, without obstacles."""
 

@@ -42,6 +42,9 @@ UNUSED_MARGIN = 1e-3
 TIMED_STEPS = 25
 """Maximum number of steps with tightened bounds where the duration moves, too: from there on halved
 intervals take fewer."""
+WARM_MU = 1e-2
+"""First barrier parameter with tightened bounds, relative to the mean density, per largest
+excess."""
 MAX_MARGIN = 0.45
 """Maximum fraction of its range by which a bound is tightened."""
 
@@ -99,7 +102,7 @@ def _solved_tighter(search: BoundedSearch, ended: Bounded, sides: Array) -> Boun
     looser = np.where(unused, sides + 0.5 * UNUSED_MARGIN, 0.0)
     search.margins = np.clip(search.margins + tighter + looser, 0.0, MAX_MARGIN)
     objective = search.objective(search.multipliers)
-    fraction = float(np.clip(1e-2 * float(sides.max()), *WARM_MU_RANGE))
+    fraction = float(np.clip(WARM_MU * float(sides.max()), *WARM_MU_RANGE))
     mu = fraction * ended.outputs.density(objective.bounds.measure)
     y, barrier = objective.outputs(ended.x).y, ended.z
     z = None

@@ -29,7 +29,7 @@ Array = npt.NDArray[np.float64]
 CONVERGED_LENGTH = 1e-9
 """Relative length of a step below which one that no longer makes progress is one of rounding."""
 ROUNDING_LENGTH = 1e-14
-"""The same below which no further step is taken."""
+"""Relative length of a step below which no further step is taken."""
 DECREASE = 1e-4
 """Decrease of the gradient's norm, relative to that of a full Newton step, that a step needs."""
 LEAST_FRACTION = 1e-6

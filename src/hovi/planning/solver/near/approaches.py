@@ -32,7 +32,8 @@ SPACING, WIDE_SPACING = 0.01, 0.1
 """Distance of positions up to which one row is enough, relative to the interval, and the same while
 the motion moves from step to step."""
 LEAST_SPACING = 1e-4
-"""The same where a pair is too close by more than the extra clearance leaves."""
+"""Distance of positions up to which one row is enough, relative to the interval, where a pair is
+too close by more than the extra clearance leaves."""
 USED = 0.7 * EXTRA_CLEARANCE * DISTANCE_SCALE
 """What a motion may use up of the extra clearance between rows, in [m]."""
 TOUCHING, AROUND, SHALLOW = 3e-4, 0.3, 0.01
@@ -40,9 +41,13 @@ TOUCHING, AROUND, SHALLOW = 3e-4, 0.3, 0.01
 then hold a motion that slides along an obstacle; how far from it, relative to the interval, and the
 largest distance beyond the least one of these rows, in [m]."""
 DIP = 0.8 * USED
-"""How far a motion may dip between them, in [m]."""
+"""How far a motion may dip between rows around a least distance, in [m]."""
 CLOSEST, WIDEST = 0.02, 0.25
-"""The least and the largest distance between them, relative to the interval."""
+"""The least and the largest distance between rows around a least distance, relative to the
+interval."""
+BEND_SAMPLES, LEAST_BEND = SAMPLES // 8, 1e-9
+"""Number of samples between those from which the curvature of a distance is taken, and its least
+value, in [m] per interval squared."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,11 +177,11 @@ def _around(at: Array, columns: Index, d: Array, below: float) -> tuple[Array, I
     d: sampled distances, (M, K). below: the largest distance there, in [m].
     """
     positions, numbers = [np.zeros(0)], [np.zeros(0, dtype=np.intp)]
-    samples, apart = np.arange(len(d)) / SAMPLES, SAMPLES // 8
+    samples, apart = np.arange(len(d)) / SAMPLES, BEND_SAMPLES
     for t, column in zip(at, columns, strict=True):
         j = int(np.clip(np.rint(t * SAMPLES), apart, len(d) - 1 - apart))
         before, here, after = d[j - apart, column], d[j, column], d[j + apart, column]
-        bend = max((before - 2.0 * here + after) * (SAMPLES / apart) ** 2, 1e-9)
+        bend = max((before - 2.0 * here + after) * (SAMPLES / apart) ** 2, LEAST_BEND)
         step = float(np.clip(np.sqrt(8.0 * DIP / bend), CLOSEST, WIDEST))
         steps = step * np.arange(1, int(AROUND / step) + 1)
         around = np.concatenate([t - steps, t + steps])

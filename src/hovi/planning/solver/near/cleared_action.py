@@ -45,7 +45,9 @@ class ClearedAction(BoundedAction):
     near: rows of distances, extended in place. Other arguments as for BoundedAction.
     """
 
-    radii = 50.0, 50.0  # the neighborhood of obstacles is not convex
+    radii = 50.0, 50.0
+    """First radius of the trust region, in a cold start and in a warm one: the neighborhood of
+    obstacles is not convex."""
 
     def __init__(
         self,

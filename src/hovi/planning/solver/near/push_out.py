@@ -19,6 +19,7 @@ from hovi.discrete.state import State
 from hovi.planning.clearance.distances import Distances
 from hovi.planning.conditions.condition import linear_at
 from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.scene.segmented_lagrangian import NODE_TOLERANCE
 from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
@@ -26,6 +27,8 @@ Mask = npt.NDArray[np.bool_]
 
 WAVES, MOST_WAVES = 12, 60
 """Number of functions of time, without one for each free end, and the largest one with seams."""
+FURTHER_POINTS = 8
+"""Number of Gauss points beyond two per wave, by which prices are integrated."""
 SAMPLES = 64, 256
 """Least and largest number of times at which distances are looked at."""
 STEP = 0.02
@@ -35,13 +38,13 @@ BEYOND = 0.005
 LOOKED_AT = 0.06
 """Distance beyond the least one up to which pairs are kept from coming closer, in [m]."""
 MAX_ITERATIONS = 30
-"""Maximum number of iterations."""
+"""Maximum number of iterations from each change to begin with."""
 STIFFNESS = 1e6
 """Price of a violation, per [m^2], relative to that of a change of the acceleration."""
 RIDGE = 1e-6
-"""Price of the change itself."""
+"""Price of a change, relative to that of its acceleration."""
 CONDITION_STIFFNESS = 1e8
-"""The same for conditions at nodes."""
+"""Price of a violation of conditions at nodes, relative to that of a change of the acceleration."""
 LONGEST = 0.2
 """Largest change of a coordinate in one iteration, in [rad] or [m]."""
 TRIES = 9
@@ -173,7 +176,7 @@ class _Deformation:
         given, T = np.zeros(len(self._t), dtype=bool), self.problem.grid.duration
         given[[0, -1]] = [not free for free in self._free]
         for each in self.problem.holds:
-            given |= (np.abs(self._t - each.time) < 1e-9 * T) & each.fixed[0].all()
+            given |= (np.abs(self._t - each.time) < NODE_TOLERANCE * T) & each.fixed[0].all()
         return given
 
     @property
@@ -209,7 +212,7 @@ class _Deformation:
     @cached_property
     def _stiffness(self) -> Array:
         """The matrix of the integral of 1/2 |x''|^2 in normalized time."""
-        x, weights = np.polynomial.legendre.leggauss(2 * self._number + 8)
+        x, weights = np.polynomial.legendre.leggauss(2 * self._number + FURTHER_POINTS)
         ddw = self.waves((x + 1) / 2)[2]
         gram = ddw.T @ (0.5 * weights[:, None] * ddw)
         gram += RIDGE * np.eye(len(gram))  # both ends may move without an acceleration

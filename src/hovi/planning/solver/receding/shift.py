@@ -22,6 +22,7 @@ from hovi.errors import InputError
 from hovi.planning.conditions.asked import times_of
 from hovi.planning.conditions.condition import Condition
 from hovi.planning.conditions.places import AtTimes
+from hovi.planning.problem.clock import SAME_LENGTH
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.goals import Via
 from hovi.planning.problem.limits import Limits
@@ -29,7 +30,7 @@ from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.central_path import CentralPath
 from hovi.planning.solver.receding.ends import first_state, turned
 from hovi.planning.solver.receding.remainder import Array, Index, Remainder
-from hovi.scene.segmented_lagrangian import SegmentedLagrangian
+from hovi.scene.segmented_lagrangian import NODE_TOLERANCE, SegmentedLagrangian
 from hovi.system.dataclass import dataclass
 
 Segmented = TypeVar("Segmented", SegmentedLagrangian, Limits)
@@ -63,7 +64,7 @@ class Shift:
         if problem.periodic:
             raise InputError("a periodic motion has no rest: replan it with its whole period.")
         left = T - elapsed
-        if duration is None or abs(duration - left) <= 1e-12 * T:
+        if duration is None or abs(duration - left) <= SAME_LENGTH * T:
             duration = left
         shift = cls(problem, elapsed, duration)
         _ = shift.grid  # raises for steps that are too short or too long
@@ -195,7 +196,11 @@ class Shift:
         seams = of.ends if isinstance(of, SegmentedLagrangian) else ()
         asked, via = times_of(self.problem.conditions), [each.time for each in self.problem.via]
         grid, left = self.problem.grid, self._left([*seams, *asked, *via])
-        return {grid.node_at(time): time for time in left if time < grid.duration * (1.0 - 1e-9)}
+        return {
+            grid.node_at(time): time
+            for time in left
+            if time < grid.duration * (1.0 - NODE_TOLERANCE)
+        }
 
     @property
     def _via(self) -> list[Via]:
@@ -204,7 +209,7 @@ class Shift:
 
     def _left(self, times: Sequence[float]) -> list[float]:
         """Those of some times that have not passed."""
-        late = self.elapsed + 1e-9 * self.problem.grid.duration
+        late = self.elapsed + NODE_TOLERANCE * self.problem.grid.duration
         return [time for time in times if time > late]
 
     @property
