@@ -30,6 +30,7 @@ WITH_ORACLES = {
     "optimize/test_bordered_model.py",
     "optimize/test_kkt_model.py",
     "optimize/test_merge_tree.py",
+    "optimize/test_small_problems.py",
     "oracles/on_grid.py",
     "planning/conditions/test_derivatives.py",
     "planning/refinement/test_hp_refinement.py",
