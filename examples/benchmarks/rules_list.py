@@ -626,7 +626,7 @@ _rule(
     "free first",
     "What distances alone limit is solved without them first, by a method without limits.",
     "FreeFirst.supports",
-    "problem.distances is not None and not problem.apart_from().limited",
+    "problem.distances is not None and not problem.with_clearance(None).limited",
     "False",
 )
 _at("distances", "planning.solver.methods.cleared_motion")

@@ -1,5 +1,7 @@
 """Small problems of kinds that stand on the KKT system, by their closed forms.
 
+A border that is not symmetric is eliminated here, from the factor of the system alone.
+
 A slider of mass 1 moves by u = a at the cost 1/2 integral u^2: its least cost over a time s is
 J = 6 d^2 / s^3 - 6 d (v0 + v1) / s^2 + 2 (v0^2 + v0 v1 + v1^2) / s for a way d between two speeds.
 """
@@ -153,7 +155,7 @@ def test_a_coordinate_without_dynamics() -> None:
 
 
 def test_force_columns_in_intervals() -> None:
-    """A weight g is lifted off a wall, or lies on it: there the wall's force carries it."""
+    """A weight g is lowered onto a wall, and lies on it: there the wall's force carries it."""
     N, g, s = 6, 9.81, 0.5
     given = at_rest(N, 1.0, 0.0)
     sliders = Sliders(np.full(N, 2 * s / N), given, force=2, weight=g)
@@ -252,8 +254,8 @@ def test_a_parameter_that_is_closed_by_an_equation() -> None:
     """A slider with |v| <= V finds its switch by a = 0, where its border is not symmetric."""
     x, t, misses = found_switch()
     assert t == pytest.approx(SWITCH, rel=1e-9)
-    for before, after in itertools.pairwise(misses[2:6]):  # quadratically
-        assert after < 5 * before**2
+    for before, after in itertools.pairwise(misses[2:6]):  # quadratically, above rounding
+        assert after < 5 * before**2 + 1e-13
     of = border(x, t)
     assert np.abs(of.B - of.C.T).max() > 0.1 * np.abs(of.B).max()
 

@@ -5,6 +5,7 @@ import pickle
 import re
 from pathlib import Path
 
+import coal
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
@@ -577,3 +578,19 @@ def test_a_joint_whose_link_has_its_name_can_be_locked() -> None:
     kept = np.delete(np.arange(free.nv), free.model.joints[free.model.getJointId("gripper")].idx_v)
     found = pin.crba(locked.model, locked.model.createData(), reduced)
     np.testing.assert_allclose(np.triu(found), np.triu(mass)[np.ix_(kept, kept)], atol=1e-12)
+
+
+def test_shapes_of_a_model_without_frames_belong_to_their_joints() -> None:
+    """The given model stays as it is."""
+    model = pin.Model()
+    joint = model.addJoint(0, pin.JointModelRZ(), pin.SE3.Identity(), "turn")
+    model.appendBodyToJoint(joint, pin.Inertia.FromSphere(1.0, 0.1), pin.SE3.Identity())
+    shapes, frames = pin.GeometryModel(), model.nframes
+    shapes.addGeometryObject(
+        pin.GeometryObject("ball", joint, pin.SE3.Identity(), coal.Sphere(0.1))
+    )
+    robot = load_robot(model, collision=shapes)
+    assert robot.collision is not None
+    (shape,) = robot.collision.geometryObjects
+    assert robot.model.frames[shape.parentFrame].name == "turn"
+    assert model.nframes == frames

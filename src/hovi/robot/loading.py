@@ -222,7 +222,10 @@ def with_locked(robot: Robot, positions: Mapping[str, float]) -> Robot:
 
 
 def _attach(geometry: pin.GeometryModel, model: pin.Model, name: str) -> None:
-    """Give shapes without a frame that of their joint. Raises ModelError for an unknown joint."""
+    """Give shapes without a frame that of their joint, which is added to the model if it has none.
+
+    Raises ModelError for an unknown joint.
+    """
     for shape in geometry.geometryObjects:
         if shape.parentJoint >= model.njoints:
             raise ModelError(
@@ -230,7 +233,10 @@ def _attach(geometry: pin.GeometryModel, model: pin.Model, name: str) -> None:
                 f"{model.njoints}: give the geometry that was built with this model."
             )
         if shape.parentFrame >= model.nframes:
-            shape.parentFrame = model.getFrameId(model.names[shape.parentJoint])
+            joint = model.names[shape.parentJoint]
+            if not model.existFrame(joint):
+                model.addJointFrame(shape.parentJoint)
+            shape.parentFrame = model.getFrameId(joint)
 
 
 def _from_model(
@@ -246,11 +252,11 @@ def _from_model(
             f"model {name!r} has {model.nv} degrees of freedom, at most {MAX_DOF} are "
             "accepted: lock joints with pinocchio.buildReducedModel first."
         )
-    shapes = [shape.copy() for shape in given if shape is not None]
+    model, shapes = model.copy(), [shape.copy() for shape in given if shape is not None]
     for shape in shapes:
         _attach(shape, model, name)
     held = locked if isinstance(locked, Mapping) else dict.fromkeys(locked, 0.0)
-    reduced, shapes = locked_model(model.copy(), shapes, held)
+    reduced, shapes = locked_model(model, shapes, held)
     queue = iter(shapes)
     kept = [None if shape is None else next(queue) for shape in given]
     text = None if srdf is None else read_srdf_file(srdf)

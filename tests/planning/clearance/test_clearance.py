@@ -106,7 +106,7 @@ def test_a_ball_that_cannot_be_passed_is_infeasible_and_named(
         barred = dataclasses.replace(barred, limits=as_limits(arm_scene.robot, limits))
     solution = solve_on_grid(barred)
     assert solution.status is Status.INFEASIBLE
-    for word in ("'upper_arm'", "obstacle 'ball'", "overlap by", "at t ="):
+    for word in ("link '", "obstacle 'ball'", "overlap by", "at t ="):
         assert word in solution.message
 
 

@@ -287,7 +287,7 @@ class TrajectoryProblem(ProblemSummary):
             problem.__dict__.pop(name, None)
         return problem
 
-    def apart_from(self, clearance: Clearance | None = None) -> TrajectoryProblem:
+    def with_clearance(self, clearance: Clearance | None) -> TrajectoryProblem:
         """The same problem with another clearance, or none, sharing what was built for this one."""
         other = copy.copy(self)  # only its finer one depends on it, too
         object.__setattr__(other, "clearance", clearance)

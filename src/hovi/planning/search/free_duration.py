@@ -351,8 +351,9 @@ class _Search:
         self.here, costlier = _sides(known, root)
         jump = (costlier.total - self.here.total) / abs(self.here.total)
         if jump <= MAX_GRID_JUMP:
-            explained = max(jump, MIN_JUMP) * abs(self.here.total)
-            self.steepest = explained / abs(costlier.duration - self.here.duration)
+            T, gap = self.here.duration, self.here.gap_to(costlier)
+            explained = max(jump, MIN_KINK) * abs(self.here.total) / T
+            self.steepest = explained / max(gap, JUMP_BRACKET)
             self.here = min(known.values(), key=lambda each: each.total)
             self.ending = f"The best duration, next to a jump of the cost by {jump:.0e} of it, is"
         else:

@@ -117,7 +117,7 @@ class Search:
         clearance = self.fine.problem().clearance
         assert clearance is not None
         assert free.problem is not None
-        problem = on_grid_of(free.problem, free).apart_from(clearance)
+        problem = on_grid_of(free.problem, free).with_clearance(clearance)
         kept, near = dataclasses.replace(free, problem=problem), 0
         ended = free.status in (*STOPPED, Status.INFEASIBLE)
         if not ended and problem.distances is not None:  # there are pairs, within reach

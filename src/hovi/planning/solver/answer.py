@@ -76,11 +76,6 @@ class Answer:
         """A path with its cost and no more, where a solve has no more to say."""
         return cls(problem, path, cost_of(problem, path), status, message, nit, central=central)
 
-    def after(self, earlier: Answer) -> Answer:
-        """The same with the steps of an earlier solve before its own."""
-        history = [*earlier.history, *self.history]
-        return dataclasses.replace(self, nit=earlier.nit + self.nit, history=history)
-
     @property
     def motion(self) -> Trajectory:
         """The motion with its momenta and metadata."""

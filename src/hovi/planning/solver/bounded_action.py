@@ -391,8 +391,9 @@ class BoundedAction(BoundedObjective[DiscretePath]):
         return self.action.retract(x, step, model)
 
     def with_fixed_rows(self) -> Self:
-        """The same, whose rows stay as they are."""
+        """The same, to be solved on its own with rows that stay as they are."""
         other = copy.copy(self)
+        other.action = copy.copy(self.action)
         other.rows = None if self.rows is None else self.rows.fixed_on(self.rows.grid)
         return other
 

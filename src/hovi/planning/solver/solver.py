@@ -142,16 +142,21 @@ class Solution(SolutionSummary):
         """The KKT system at the motion, factored: how it follows its ends, and n_neg.
 
         Of a minimum, or of a stationary point without limits; active limits count as equations.
-        One within limits that another process found is solved for once more, from itself.
-        Raises InputError without a problem, within limits for a motion that is no minimum, and for
-        more than 1,000 intervals.
+        Where it is not known how the solve ended, as of a minimum that another process found, it is
+        solved for once more, from itself. Raises InputError without a problem, within limits for a
+        motion that is no minimum, for a periodic one, and for more than 1,000 intervals.
         """
         # Here, since most solutions are used without it.
         from hovi.planning.solver.outcome.solution_factor import SolutionFactor
 
         known, problem = self, self._solved_problem
-        if self.ended is None and problem.limited and self.status is Status.MINIMUM:
-            known = self.replan()
+        if self.ended is None and problem.limited:
+            free = problem.with_clearance(None)
+            if not free.limited and self.instants is None:  # distances that have no force
+                problem = free
+            elif self.status is Status.MINIMUM:
+                known = self.replan()
+                problem = known._solved_problem
         return SolutionFactor.of(problem, known.trajectory.path, known.ended)
 
     @cached_property

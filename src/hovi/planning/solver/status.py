@@ -63,9 +63,11 @@ def unfinished(why: Reason) -> tuple[Status, str]:
     return _UNFINISHED[why]
 
 
-def infeasible_sentence(reason: str) -> str:
-    """The message about limits that no motion satisfies; reason: a clause."""
-    return f"no motion within the limits was found: {reason}."
+def infeasible_sentence(reason: str, problem: TrajectoryProblem) -> str:
+    """The message about a problem that no motion satisfies; reason: a clause."""
+    within = problem.has_limits or bool(problem.bounds) or problem.distances is None
+    place = "within the limits" if within else "that keeps its distances"
+    return f"no motion {place} was found: {reason}."
 
 
 def diverged(reason: str, steps: int) -> str:

@@ -32,6 +32,7 @@ from hovi.planning.problem.limits import Limits
 from hovi.planning.problem.presolve.end_torques import static_sentence
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.action_objective import ActionObjective, LinearAlgebra
+from hovi.planning.solver.answer import Answer
 from hovi.planning.solver.bounded_action import BoundedAction
 from hovi.planning.solver.central_path import CentralPath
 from hovi.planning.solver.condition_outputs import ConditionOutputs
@@ -86,6 +87,7 @@ class BoundedSearch:
         (2, N, kinds nv + values of conditions).
     multipliers, unmet: of the constraints, and why they cannot be satisfied, or "".
     last: the problem and the motion of the last solve. solved: how it ended, and its objective.
+    free: a motion that was found without distances, if there is one.
     points: of the central path, with a larger barrier than that of the last solution. at_level:
         whether a solve begins on one. free_duration: whether the duration is free.
     along, level: central path of a similar problem, if there is one on as many intervals, and the
@@ -110,6 +112,7 @@ class BoundedSearch:
         self.guess, self.along, self.level = self.start.x, self.start.z, self.start.mu
         self.last = self.problem, self.guess
         self.history: list[Iteration] = []
+        self.free: DiscretePath | None = None
         apart = self.problem.distances is None
         self.near: ClearanceRows | None = None if apart else self.no_near_rows()
         self.margins = self.no_margins()
@@ -161,6 +164,10 @@ class BoundedSearch:
         """No rows of distances yet."""
         assert self.problem.distances is not None
         return ClearanceRows(self.problem, self.problem.distances, self.bounded_distance)
+
+    def goes_on_from(self, free: Answer) -> None:
+        """Count the steps of an answer without distances, and begin at its motion."""
+        self.iterations, self.history, self.free = free.nit, list(free.history), free.path
 
     def look_around(self, path: DiscretePath) -> None:
         """Add rows for pairs that are near along a motion that nearly is a solution."""

@@ -60,7 +60,7 @@ def _without_distances(search: BoundedSearch, guess: DiscretePath) -> Bounded:
     """The solution, unless its distances are too small: then a rough motion without them."""
     near = search.near
     assert near is not None
-    near.probing = True
+    near.probing, guess = True, guess if search.free is None else search.free
     if not search.problem.constrained:
         return search.solve(Start(guess))
 

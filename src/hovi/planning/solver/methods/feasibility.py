@@ -44,15 +44,20 @@ def feasible_motion(search: BoundedSearch) -> tuple[Bounded, str]:
     """A motion from the guess within bounds at points and control points, or why there is none."""
     ended = _solved_nearby(search) or _solved_at_all(search)
     failed = ended.why is Reason.DIVERGED
-    if search.near is not None:
-        missed = search.too_close(ended.x) if ended.feasible else search.worst(ended.x)
-        return ended, missed if failed else ""
-    if not failed or (ended.feasible and not search.unsatisfied(ended.x)):
+    if search.near is not None and failed:
+        missed = search.too_close if ended.feasible else search.worst
+        return ended, missed(ended.x)
+    if search.near is not None or not failed or _satisfies(search, ended):
         return ended, ""
     reason = locally_infeasible(search, ended)
     if reason or ended.why in STOPPED:
         return ended, reason
     return restored_motion(search, ended)
+
+
+def _satisfies(search: BoundedSearch, ended: Bounded) -> bool:
+    """Whether a motion is within its bounds and satisfies its equations."""
+    return ended.feasible and not search.unsatisfied(ended.x)
 
 
 def _solved_nearby(search: BoundedSearch) -> Bounded | None:

@@ -7,6 +7,8 @@ import dataclasses
 from hovi.optimize.criteria import Criteria
 from hovi.optimize.ended import Reason
 from hovi.planning.clearance.clearance_violation import near_pairs
+from hovi.planning.problem.contradictions import contradiction
+from hovi.planning.problem.limits import no_limits
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.answer import Answer
 from hovi.planning.solver.methods.interior_point import InteriorPoint
@@ -19,14 +21,22 @@ from hovi.system.interruption import record_interrupt
 
 WITHOUT_LIMITS: tuple[Method, ...] = (TrustRegion(), LagrangeNewton())
 """Methods for problems without limits."""
+SOLVED = Status.MINIMUM, Status.SADDLE
+"""Statuses of motions that may be kept."""
+ENDED = Status.INFEASIBLE, Status.TIME_LIMIT, Status.INTERRUPTED
+"""Statuses after which distances are not looked at."""
 
 
 class FreeFirst(Method):
-    """The method without limits; the one within limits where pairs come too close in its motion."""
+    """The method without limits, then the one within limits from its motion.
+
+    The second one is left out where the motion without distances is one that keeps them, and where
+    there is none for another reason.
+    """
 
     def supports(self, problem: TrajectoryProblem) -> bool:
         """Problems with distances, and without other limits."""
-        return problem.distances is not None and not problem.apart_from().limited
+        return problem.distances is not None and not problem.with_clearance(None).limited
 
     def minimize(
         self,
@@ -36,15 +46,17 @@ class FreeFirst(Method):
         report: Report | None = None,
     ) -> Answer:
         """See Method.minimize."""
-        deadline, free = Deadline(criteria.time_limit), problem.apart_from()
+        if contradiction(problem, no_limits(problem.coordinates)):
+            return InteriorPoint().minimize(problem, start, criteria, report)
+        deadline, free = Deadline(criteria.time_limit), problem.with_clearance(None)
         method = next(method for method in WITHOUT_LIMITS if method.supports(free))
         found = method.minimize(free, start, criteria, report)
         found = dataclasses.replace(found, problem=problem)
-        if found.status not in (Status.MINIMUM, Status.SADDLE):
+        if found.status in ENDED:
             return found
         try:
             with deadline.in_force():
-                apart = _keeps_distances(found)
+                apart = found.status in SOLVED and _keeps_distances(found)
         except KeyboardInterrupt:
             record_interrupt()
             return _unchecked(found, Reason.INTERRUPTED)
@@ -53,7 +65,7 @@ class FreeFirst(Method):
         if apart:
             return found
         left = dataclasses.replace(criteria, time_limit=deadline.seconds_left)
-        return InteriorPoint().minimize(problem, start, left, report).after(found)
+        return InteriorPoint(found).minimize(problem, start, left, report)
 
 
 def _keeps_distances(found: Answer) -> bool:

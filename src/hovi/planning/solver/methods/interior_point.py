@@ -27,14 +27,20 @@ from hovi.planning.solver.status import (
     saddle_in_words,
     unfinished,
 )
+from hovi.system.dataclass import dataclass
 
 
+@dataclass(frozen=True)
 class InteriorPoint(Method):
     """A primal-dual interior-point method, whose steps satisfy equations to first order.
 
     First a motion within bounds at the quadrature points is found; then bounds are tightened and
     intervals halved until the limits hold everywhere to their tolerance.
+
+    free: what was found without distances, whose steps count; None where that was not looked for.
     """
+
+    free: Answer | None = None
 
     def supports(self, problem: TrajectoryProblem) -> bool:
         """Problems with limits or obstacles, with or without equality constraints."""
@@ -51,9 +57,11 @@ class InteriorPoint(Method):
         limits = problem.limits or no_limits(problem.coordinates)
         reason = contradiction(problem, limits)
         if reason:
-            said = infeasible_sentence(reason)
+            said = infeasible_sentence(reason, problem)
             return Answer.at(problem, start.x, Status.INFEASIBLE, said)
         search = BoundedSearch(problem, limits, criteria, report, start)
+        if self.free is not None:
+            search.goes_on_from(self.free)
         return answered(partial(_searched, search), partial(_ended, search))
 
 
@@ -72,7 +80,7 @@ def _searched(search: BoundedSearch) -> Answer:
     if broken:  # by an effect, not by the limits
         status, message = Status.DIVERGED, diverged(broken, nit)
     elif reason:
-        status, message = Status.INFEASIBLE, infeasible_sentence(reason)
+        status, message = Status.INFEASIBLE, infeasible_sentence(reason, problem)
     elif ended.why is not Reason.STATIONARY:
         status, message = _unfinished(ended.why, nit, value)
         message += missed_sentence(problem, x) if problem.constrained else ""

@@ -8,6 +8,7 @@ motion inside an obstacle were moved at once, it would leave it forwards and bac
 
 from __future__ import annotations
 
+import contextlib
 from functools import cached_property
 
 import numpy as np
@@ -16,6 +17,7 @@ import numpy.typing as npt
 from hovi.discrete.grid import DiscretePath
 from hovi.discrete.guess import Curve, stretched
 from hovi.discrete.state import State
+from hovi.errors import ChartError
 from hovi.planning.clearance.distances import Distances
 from hovi.planning.conditions.condition import linear_at
 from hovi.planning.problem.problem import TrajectoryProblem
@@ -69,7 +71,8 @@ def pushed_out(
     for seed in range(TRIES):
         found = deformation.solved(deformation.bumps(seed))
         if found is not None:
-            return problem.path(deformation.curve(found))
+            with contextlib.suppress(ChartError):  # it turns too far for the intervals
+                return problem.path(deformation.curve(found))
     return None
 
 

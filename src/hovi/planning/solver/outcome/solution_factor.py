@@ -42,9 +42,12 @@ EndName = Literal["start", "goal"]
 SHARP_BARRIER, MAX_STEPS = 1e-12, 50
 """Last barrier parameter, relative to the mean density of the cost, which separates
 bounds that hold the motion from those that it touches, and the maximum number of steps to it."""
+STATIONARY = 1e-6
+"""Decrease of the cost that a Newton step predicts, relative to it, above which a motion is none of
+which there is a factor."""
 FREEDOM = 1e-6
 """What a motion that follows a change may miss of the active bounds, relative to their slopes."""
-TOUCHED = 100.0
+TOUCHED = 1e3
 """Ratio of a multiplier, relative to the mean density of the cost, and its gap, relative to the
 range, up to which a bound is touched without a force."""
 
@@ -76,10 +79,12 @@ class SolvedBounds:
 class SolutionFactor:
     """The factored KKT system of a solution, in the columns of its intervals and their unknowns.
 
-    problem, path: solved. system: the matrix and its right-hand sides. active: number of bounds
-    that are taken as equations.
+    problem, path: solved, the path with next to no barrier, and a duration that stays.
+    system: the matrix and its right-hand sides. active: number of bounds that are taken as
+        equations.
     strictness: the least, over all bounds, of the larger one of the multiplier, relative to the
-        mean density of the cost, and the gap, relative to the range; infinite without bounds.
+        mean density of the cost, and the gap, relative to the range; infinite without bounds, and
+        some 1e-6 at limits that hold for a while, where one row after the other begins to act.
     """
 
     problem: TrajectoryProblem
@@ -95,12 +100,18 @@ class SolutionFactor:
         """The system at a solution; known: where a solve within limits ended.
 
         Raises InputError for a limited problem of which that is not known, as after a solve that
-        found no minimum, and for grids of more than 1,000 intervals, whose matrix is no band.
+        found no minimum, for a periodic one, whose ends move together, and for grids of more than
+        1,000 intervals, whose matrix is no band.
         """
+        if problem.periodic:
+            raise InputError(
+                "the factor of a periodic motion is not available, since its ends move together; "
+                "plan between states."
+            )
         if known is None and problem.limited:
             raise InputError(
-                "the factor within limits is that of a minimum, and none was found; see the "
-                "solution's message."
+                "the factor of a limited motion, also by distances alone, is that of a minimum as "
+                "it was solved for, and there is none; see the solution's message."
             )
         if known is not None:
             path, known = known.sharpened(path)
@@ -112,9 +123,11 @@ class SolutionFactor:
             change = _kkt(objective, path, model, []).least_squares_multipliers()
             objective.hold(change)
             model = _exact_model(objective, path, barrier.multipliers)
-        active, strictness = _active(barrier)
+        density = objective.outputs(path).density(objective.bounds.measure)
+        active, strictness = _active(barrier, density)
         rows = _rows_of(objective, model, np.flatnonzero(active))
         system = _kkt(objective, path, model, rows)
+        _require_stationary(system, abs(objective.outputs(path).value))
         return cls(problem, path, system, int(active.sum()), strictness)
 
     @cached_property
@@ -171,8 +184,14 @@ class SolutionFactor:
         return np.asarray(0.5 * (curvature + curvature.T))
 
     def _number(self, end: EndName) -> int:
-        if end not in ("start", "goal"):
+        if not isinstance(end, str) or end not in ("start", "goal"):
             raise InputError(f"end must be 'start' or 'goal', got {end!r:.60}.")
+        limits = self.problem.limits
+        if end == "start" and limits is not None and limits.excused:
+            raise InputError(
+                "the start is outside of its limits, which are wider until it is led back: they "
+                "move with the start, and slopes in it are not available."
+            )
         return int(end == "goal")
 
     def _end_columns(self, end: EndName, order: int, joint: int) -> Array:
@@ -198,6 +217,17 @@ class SolutionFactor:
         return columns, z
 
 
+def _require_stationary(system: KktModel, cost: float) -> None:
+    """Raise InputError unless a Newton step leads to next to no decrease."""
+    s, _ = system.exact_factor().solve(-system.gradient, np.zeros(system.equations))
+    decrease = 0.5 * abs(float(s @ system.gradient))
+    if not decrease <= STATIONARY * cost + np.finfo(float).tiny:
+        raise InputError(
+            "the factor is that of a motion at which the cost is stationary, and this one is not: "
+            "see the solution's message, and plan with more time or steps."
+        )
+
+
 def _unlimited(problem: TrajectoryProblem, path: DiscretePath) -> BoundedAction:
     """The objective of a problem without limits, with multipliers of equations that are zero."""
     known = first_multipliers(problem, path) if problem.constrained else None
@@ -218,15 +248,16 @@ def _exact_model(objective: BoundedAction, path: DiscretePath, multipliers: Arra
     return model
 
 
-def _active(barrier: Barrier) -> tuple[npt.NDArray[np.bool_], float]:
-    """Which bounds are active, (R,), and the strictness of that.
+def _active(barrier: Barrier, density: float) -> tuple[npt.NDArray[np.bool_], float]:
+    """Which bounds are active, (R,), and the strictness of that. density: mean one of the cost.
 
     Towards mu = 0 forces stay, and z / gap grows as 1 / mu; it stays near 1 where a bound is
     touched without a force.
     """
-    bounds, z = barrier.bounds, np.maximum(barrier.zl, barrier.zu) / barrier.scale
-    gap = np.minimum(barrier.s - bounds.lower, bounds.upper - barrier.s)
-    return z > TOUCHED * gap, float(np.min(np.maximum(z, gap), initial=np.inf))
+    z = np.stack([barrier.zl, barrier.zu]) / max(density, np.finfo(float).tiny)
+    gap = np.stack([barrier.s - barrier.bounds.lower, barrier.bounds.upper - barrier.s])
+    active = np.any(z > TOUCHED * gap, axis=0)
+    return active, float(np.min(np.maximum(z, gap), initial=np.inf))
 
 
 def _rows_of(objective: BoundedAction, model: BandModel, outputs: Index) -> list[ConstraintRows]:
@@ -257,7 +288,8 @@ def _kkt(
     if action.multipliers is not None:
         rows = [*action.equations.rows(path, action.expansion, action.jets(path)), *rows]
     none = ConstraintRows(np.zeros(0, np.intp), np.zeros((0, 1, m, n)))
-    layout = KktLayout.of(structure.layout, rows := rows or [none])
+    rows = rows or [none]
+    layout = KktLayout.of(structure.layout, rows)
     bands = structure.metric_band, layout.extended(structure.metric_band)
     still = np.zeros(len(layout.multipliers))
     return KktModel(model.intervals, rows, still, layout, *bands)

@@ -50,7 +50,7 @@ def infeasible_at_once(
     problem: TrajectoryProblem, guess: str | Trajectory | DiscretePath, reason: str
 ) -> Solution:
     """The guess of a problem that is known to have no motion. reason: as a clause."""
-    path, message = guess_path(problem, guess), infeasible_sentence(reason)
+    path, message = guess_path(problem, guess), infeasible_sentence(reason, problem)
     return solution_of(Answer.at(problem, path, Status.INFEASIBLE, message))
 
 
