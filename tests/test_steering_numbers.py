@@ -72,7 +72,7 @@ def test_the_numbers_of_a_source_have_a_row_by_constant_and_function(script: Any
         "number of steps.",
         "of them.",
     ]
-    assert rows[3].meaning.startswith("mathematics: A point of a cubic. `return x[3] ** 3 + 4.0")
+    assert rows[3].meaning.startswith("inside: A point of a cubic. `return x[3] ** 3 + 4.0")
 
 
 @pytest.mark.parametrize(

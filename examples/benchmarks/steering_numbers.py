@@ -1,9 +1,10 @@
 """The numbers that steer the code that solves: where each is, and what it means.
 
-A number is a literal of the packages of solving_statements.py, with these exceptions: -1, 0, 1, 2
-and 1/2, subscripts, exponents, axes, and what functions of shapes and of evenly spaced points are
-called with. Constants have a row each, with the string that follows them; the numbers inside a
-function have one row, with what the function does and their lines.
+A number is a literal of the packages of solving_statements.py, with these exceptions: 0, and -1, 1,
+2 and 1/2 where they have no name, subscripts, exponents that are integers, axes, and what functions
+of shapes and of evenly spaced points are called with. Constants have a row each, with the string
+that follows them; the numbers inside a function have one row, with what the function does and their
+lines.
 
     python steering_numbers.py            # prints the table
     python steering_numbers.py --write    # writes it to docs/tables/numbers.md
@@ -24,7 +25,7 @@ from solving_statements import PACKAGES
 TOP = Path(__file__).resolve().parents[2]
 TABLE = TOP / "docs" / "tables" / "numbers.md"
 PLAIN = {-1, 0, 1, 2, 0.5}
-"""Values that steer nothing."""
+"""Values that steer nothing, unless they have a name."""
 SHAPED = {"zeros", "ones", "empty", "full", "eye", "reshape", "range", "arange", "linspace"}
 """Functions whose arguments are lengths of arrays and numbers of points."""
 AXES = {"axis", "axes", "ndim"}
@@ -115,10 +116,20 @@ class Rows:
 
     def _numbers(self) -> Iterator[ast.Constant]:
         for node in self.parents:
-            if isinstance(node, ast.Constant) and steers(node.value):
+            if isinstance(node, ast.Constant) and self._steers(node):
                 above = [node, *self._above(node)]
                 if not any(is_left_out(*pair) for pair in pairwise(above)):
                     yield node
+
+    def _steers(self, node: ast.Constant) -> bool:
+        """Whether a literal is a number that is not plain, or that of a named constant; not 0."""
+        if not isinstance(node.value, int | float) or isinstance(node.value, bool):
+            return False
+        if node.value not in PLAIN or node.value == 0:
+            return node.value != 0
+        place = self._place(node)
+        names = [] if isinstance(place, Function) else targets(place)
+        return bool(names) and all(name.isupper() for name in names)
 
     def _above(self, node: ast.AST) -> Iterator[ast.AST]:
         """What a node is in, from the inside out."""
@@ -176,7 +187,7 @@ class Rows:
             return "text of a message"
         parent = self.parents[number]
         place = isinstance(parent, ast.Tuple) and isinstance(number.value, int)
-        return "place or length in arrays" if place or compares_length(parent) else "mathematics"
+        return "place or length in arrays" if place or compares_length(parent) else "inside"
 
     def _summary(self, function: ast.AST) -> Iterator[str]:
         """The first paragraph of what documents a function, or else what it is in."""
@@ -217,17 +228,12 @@ def is_left_out(node: ast.AST, parent: ast.AST) -> bool:
     if isinstance(parent, ast.Subscript):
         return node is parent.slice
     if isinstance(parent, ast.BinOp) and isinstance(parent.op, ast.Pow):
-        return node is parent.right
+        number = isinstance(node, ast.Constant) and isinstance(node.value, float)
+        return node is parent.right and not number
     if isinstance(parent, ast.Call):
         axes = isinstance(node, ast.keyword) and node.arg in AXES
         return axes or (node is not parent.func and called_name(parent) in SHAPED)
     return False
-
-
-def steers(value: object) -> bool:
-    """Whether a literal is a number, and not a plain one."""
-    is_number = isinstance(value, int | float) and not isinstance(value, bool)
-    return is_number and value not in PLAIN
 
 
 def called_name(call: ast.Call) -> str:

@@ -57,8 +57,8 @@ NEARBY = 0.05
 """Change of q, and of T v, in [rad] or [m], up to which a motion near one that passed is not
 compared with a finer one again."""
 FARTHER, GROWTH = 0.5, 2.0
-"""That change without obstacles, equations and segments while the same limits are active or,
-without any, no joint spins; and the factor on an estimate that is kept beyond NEARBY."""
+"""Largest such change without obstacles, equations and segments while the same limits are active
+or, without any, no joint spins; and the factor on an estimate that is kept beyond NEARBY."""
 PRICE_CHANGE, LEAST_PRICE = 0.25, 0.02
 """Relative change of the price of a limit up to which it is the same one, and the least price, as a
 fraction of the cost, that this is relative to: see limit_prices."""

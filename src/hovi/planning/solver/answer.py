@@ -45,7 +45,7 @@ class Answer:
     jets: (q, v, a) of the path at the quadrature points, if they were computed.
     model: the quadratic model of the last step of a solve without bounds or equations.
     central: the path of a barrier method towards the motion, for warm starts.
-    ended: where a solve within limits ended; None for others.
+    solved_bounds: where a solve within limits ended; None for others.
     """
 
     problem: TrajectoryProblem
@@ -61,7 +61,7 @@ class Answer:
     jets: list[Jet] | None = None
     model: QuadraticModel | None = None
     central: CentralPath | None = None
-    ended: SolvedBounds | None = None
+    solved_bounds: SolvedBounds | None = None
 
     @classmethod
     def at(

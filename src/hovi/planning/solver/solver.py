@@ -98,7 +98,7 @@ class Solution(SolutionSummary):
     forces: multipliers of limits and of passive joints' torques at the quadrature points, and of
         limits at instants between them. instants: these; None for none.
     central, model: what `replan` starts from, the path of a barrier method or the last model.
-    ended: where a solve within limits ended, from which `factor` follows; None for others.
+    solved_bounds: where a solve within limits ended, from which `factor` follows; None for others.
     check: returns a replanned motion with its error estimate or as UNRESOLVED; None for no check.
     """
 
@@ -120,7 +120,7 @@ class Solution(SolutionSummary):
     instants: Instants | None = field(default=None, repr=False)
     central: CentralPath | None = field(default=None, repr=False)
     model: QuadraticModel | None = field(default=None, repr=False)
-    ended: SolvedBounds | None = field(default=None, repr=False)
+    solved_bounds: SolvedBounds | None = field(default=None, repr=False)
     check: Check | None = field(default=None, repr=False)
 
     @cached_property
@@ -150,14 +150,14 @@ class Solution(SolutionSummary):
         from hovi.planning.solver.outcome.solution_factor import SolutionFactor
 
         known, problem = self, self._solved_problem
-        if self.ended is None and problem.limited:
+        if self.solved_bounds is None and problem.limited:
             free = problem.with_clearance(None)
             if not free.limited and self.instants is None:  # distances that have no force
                 problem = free
             elif self.status is Status.MINIMUM:
                 known = self.replan()
                 problem = known._solved_problem
-        return SolutionFactor.of(problem, known.trajectory.path, known.ended)
+        return SolutionFactor.of(problem, known.trajectory.path, known.solved_bounds)
 
     @cached_property
     def duration_derivative(self) -> float:
@@ -447,7 +447,7 @@ def solution_of(result: Answer, setup_seconds: float = 0.0, solve_seconds: float
         instants=result.instants,
         central=result.central,
         model=result.model,
-        ended=result.ended,
+        solved_bounds=result.solved_bounds,
     )
 
 

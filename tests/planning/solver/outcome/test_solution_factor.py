@@ -168,8 +168,10 @@ def test_without_freedom_in_a_joint_its_slopes_are_no_numbers() -> None:
 
 def test_a_solution_from_another_process_is_solved_for_once_more() -> None:
     found = solve_on_grid(two_link({"v": 2.1}), barrier=BARRIER)
-    again: Any = dataclasses.replace(found, ended=pickle.loads(pickle.dumps(found.ended)))
-    assert again.ended is None
+    again: Any = dataclasses.replace(
+        found, solved_bounds=pickle.loads(pickle.dumps(found.solved_bounds))
+    )
+    assert again.solved_bounds is None
     np.testing.assert_allclose(
         again.factor.cost_curvature("goal"), found.factor.cost_curvature("goal"), rtol=1e-2
     )

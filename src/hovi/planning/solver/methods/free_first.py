@@ -31,7 +31,7 @@ class FreeFirst(Method):
     """The method without limits, then the one within limits from its motion.
 
     The second one is left out where the motion without distances is one that keeps them, and where
-    there is none for another reason.
+    there is none for another reason; the first one near a motion that distances have held.
     """
 
     def supports(self, problem: TrajectoryProblem) -> bool:
@@ -46,7 +46,8 @@ class FreeFirst(Method):
         report: Report | None = None,
     ) -> Answer:
         """See Method.minimize."""
-        if contradiction(problem, no_limits(problem.coordinates)):
+        known = start.z is not None  # from a motion that distances held
+        if known or contradiction(problem, no_limits(problem.coordinates)):
             return InteriorPoint().minimize(problem, start, criteria, report)
         deadline, free = Deadline(criteria.time_limit), problem.with_clearance(None)
         method = next(method for method in WITHOUT_LIMITS if method.supports(free))

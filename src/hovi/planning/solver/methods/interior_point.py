@@ -95,7 +95,7 @@ def _searched(search: BoundedSearch) -> Answer:
     if status is Status.MINIMUM:
         central, solved = search.central_path(ended), search.solved_bounds(ended)
     counted = value, status, message, nit, n_neg, history
-    return Answer(problem, x, *counted, forces, instants, central=central, ended=solved)
+    return Answer(problem, x, *counted, forces, instants, central=central, solved_bounds=solved)
 
 
 def _ended(search: BoundedSearch, why: Reason) -> Answer:

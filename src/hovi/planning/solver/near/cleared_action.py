@@ -196,11 +196,7 @@ class ClearedAction(BoundedAction):
     def with_fixed_rows(self) -> Self:
         """See BoundedAction.with_fixed_rows."""
         other = super().with_fixed_rows()
-        assert other.rows is not None
-        order = self.near.order
-        other.near = self.near.copied(fixed=True)
-        other.near.stand_behind(other.rows)
-        other.near.order = order
+        other.near = self.near.copied(fixed=True).on(self.problem, other.rows)
         other._limit_outputs = RecentPaths()
         return other
 
