@@ -109,10 +109,6 @@ class Sliders:
         return columns, float(0.5 * np.sum(SCHEME.weights * self.steps[:, None] * u**2)), model
 
 
-def no_rows(m: int, n: int = 1) -> list[ConstraintRows]:
-    return [ConstraintRows(np.zeros(0, np.intp), np.zeros((0, 1, m, n)))]
-
-
 def at_rest(N: int, start: float, goal: float, n: int = 1) -> Array:
     """Ends at rest; the nodes between them are free."""
     given = np.full((N + 1, 2, n), np.nan)
@@ -131,7 +127,7 @@ def test_a_node_with_two_velocities(bounce: float) -> None:
     given, ratio = at_rest(N, 1.0, 0.5), np.ones(N + 1)
     given[N // 2, 0], ratio[N // 2] = 0.0, -bounce
     steps = np.full(N, 2 * s / N)
-    columns, effort, _ = Sliders(steps, given, ratio).solved(no_rows(COLUMNS))
+    columns, effort, _ = Sliders(steps, given, ratio).solved([ConstraintRows.none(COLUMNS, 1)])
     before = 6 * (-1.0 - bounce * 0.5) / (4 * s * (1 + bounce**2))
     assert columns[N // 2 - 1, 3, 0] / steps[0] == pytest.approx(before, rel=1e-12)
     assert columns[N // 2, 1, 0] / steps[0] == pytest.approx(-bounce * before, abs=1e-12)
@@ -218,7 +214,7 @@ def last_acceleration(sliders: Sliders, columns: Array) -> float:
 def residual(x: Array, t: float, way: float = WAY) -> Array:
     """The gradient of the effort at unknowns x, and the acceleration at the switch."""
     sliders = speeding_up(t, way)
-    model = sliders.model(no_rows(COLUMNS))
+    model = sliders.model([ConstraintRows.none(COLUMNS, 1)])
     columns = sliders.known + model.plain.gather(x)
     force = np.einsum("kcdab,kdb->kca", model.plain.intervals.hessian, columns)
     return np.append(model.plain.scatter(force), last_acceleration(sliders, columns))
@@ -227,7 +223,7 @@ def residual(x: Array, t: float, way: float = WAY) -> Array:
 def border(x: Array, t: float) -> ClosedBorder:
     """The derivatives of the residual, those in t by differences."""
     sliders, h = speeding_up(t), 1e-4
-    model = sliders.model(no_rows(COLUMNS))
+    model = sliders.model([ConstraintRows.none(COLUMNS, 1)])
     slope = (
         8 * (residual(x, t + h) - residual(x, t - h))
         - (residual(x, t + 2 * h) - residual(x, t - 2 * h))

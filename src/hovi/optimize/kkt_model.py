@@ -53,6 +53,11 @@ class ConstraintRows:
     slopes: Array
     families: Index | None = None
 
+    @classmethod
+    def none(cls, m: int, n: int) -> Self:
+        """No constraints of intervals with m columns of n components."""
+        return cls(np.zeros(0, np.intp), np.zeros((0, 1, m, n)))
+
     @cached_property
     def flat(self) -> Array:
         """The slopes with one column per component, shape (B, E, m n)."""

@@ -6,7 +6,7 @@ With equality constraints it is their Lagrangian, see hovi.planning.solver.multi
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cached_property, partial
 from typing import Literal
 
@@ -23,7 +23,7 @@ from hovi.discrete.interval_paths import move, move_any
 from hovi.errors import InputError
 from hovi.optimize.banded_model import BandModel
 from hovi.optimize.equation_model import EquationModel, PenaltyModel
-from hovi.optimize.kkt_model import KktModel
+from hovi.optimize.kkt_model import ConstraintRows, KktLayout, KktModel
 from hovi.optimize.merge_tree import MergeTreeModel
 from hovi.optimize.quadratic_model import IntervalSum, QuadraticModel
 from hovi.optimize.trust_region import Objective
@@ -257,19 +257,31 @@ class ActionObjective(Objective[DiscretePath]):
 
     def under_equations(self, x: DiscretePath, model: BandModel) -> EquationModel:
         """The last model, at x, whose steps satisfy the equations to first order."""
-        return EquationModel(model, self._kkt(x, model), self.residual(x))
+        return EquationModel(model, self.kkt(x, model), self.residual(x))
 
     def with_penalty(self, x: DiscretePath, model: BandModel, weight: float) -> PenaltyModel:
         """The last model, at x and the multipliers weight c, with weight |c|^2 / 2 added."""
-        return PenaltyModel(model, self._kkt(x, model), weight)
+        return PenaltyModel(model, self.kkt(x, model), weight)
 
-    def _kkt(self, x: DiscretePath, model: BandModel) -> KktModel:
-        """The last model, at x, with the equations' rows."""
-        equations = self.equations
-        rows = equations.rows(x, self.expansion, self.jets(x))
-        layout, wide = equations.layout(rows)
-        none, bands = np.zeros(len(layout.multipliers)), (self.structure.metric_band, wide)
-        return KktModel(model.intervals, rows, none, layout, *bands)
+    def kkt(
+        self, x: DiscretePath, model: BandModel, bounds: Sequence[ConstraintRows] = ()
+    ) -> KktModel:
+        """The last model, at x, with the rows of equations, and those of bounds if there are any.
+
+        Equations are those of which multipliers are known.
+        """
+        rows: list[ConstraintRows] = []
+        if self.multipliers is not None:
+            rows = self.equations.rows(x, self.expansion, self.jets(x))
+        metric = self.structure.metric_band
+        if rows and not bounds:
+            layout, wide = self.equations.layout(rows)
+        else:
+            rows = [*rows, *bounds] or [ConstraintRows.none(*model.intervals.gradient.shape[1:])]
+            layout = KktLayout.of(self.structure.layout, rows)
+            wide = layout.extended(metric)
+        none = np.zeros(len(layout.multipliers))
+        return KktModel(model.intervals, rows, none, layout, metric, wide)
 
     def residual(self, x: DiscretePath) -> Array:
         """c of the equations at x, (E,), none without multipliers; the last one is cached."""

@@ -26,10 +26,10 @@ from hovi.planning.conditions.function import Points
 from hovi.planning.problem.limits import Limits, limited_columns
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.action_objective import ActionObjective, LinearAlgebra
+from hovi.planning.solver.condition_outputs import ConditionOutputs
 from hovi.planning.solver.limits.limit_rows import LimitRows, push_rows
 from hovi.planning.solver.missed_equations import within
 from hovi.planning.solver.multipliers import Multipliers
-from hovi.planning.solver.point_outputs import PointOutputs
 from hovi.scene.lagrangian import PointTerms, over_time
 
 Array = npt.NDArray[np.float64]
@@ -65,7 +65,7 @@ class BoundedAction(BoundedObjective[DiscretePath]):
         margins: Array | None = None,
         algebra: LinearAlgebra | None = None,
         multipliers: Multipliers | None = None,
-        more: PointOutputs | None = None,
+        more: ConditionOutputs | None = None,
         rows: LimitRows | None = None,
     ) -> None:
         self.problem = problem
@@ -91,7 +91,7 @@ class BoundedAction(BoundedObjective[DiscretePath]):
         self._with_rows()
         self._predicted: list[Array] | None = None
         self._jacobian = np.zeros((0, 0, 0))
-        self._torque_weights: Array | None = None
+        self._torque_weights = np.zeros((0, 0))
         self._before_hold = multipliers
 
     def _with_rows(self) -> None:
@@ -259,8 +259,6 @@ class BoundedAction(BoundedObjective[DiscretePath]):
     def _with_torque_weights(self, curvatures: list[Array]) -> list[Array]:
         """The weights of the outputs' curvature with those of torques in the further outputs."""
         more = self._torque_weights
-        if more is None:
-            return curvatures
         others = self._size - self._jet_size - more.shape[1]  # such as torque rates
         padded = np.pad(more, ((0, 0), (0, others)))
         return [each + padded[part] for each, part in zip(curvatures, self._parts, strict=True)]

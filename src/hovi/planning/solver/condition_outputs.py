@@ -7,6 +7,8 @@ S = (w y_xtau) J, next to those of tau with the weights w y_tau, which are the t
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 import numpy.typing as npt
 
@@ -16,15 +18,28 @@ from hovi.planning.conditions.condition import scales
 from hovi.planning.conditions.excess import excess_of, worst
 from hovi.planning.conditions.function import Curvature, Points, Slopes
 from hovi.planning.problem.problem import TrajectoryProblem
-from hovi.planning.solver.point_outputs import ExpandedOutputs, PointOutputs, Range
 
 Array = npt.NDArray[np.float64]
+
+Range = tuple[Array, Array]
 
 JET = "q", "v", "a"
 
 
-class ConditionOutputs(PointOutputs):
-    """The values of conditions over their scales, between their bounds.
+class ExpandedOutputs(NamedTuple):
+    """The derivatives of outputs in the jet (q, v, a).
+
+    jacobian: shape (P, K, 3 nv). curvature: sum_k force_k d2 y_k at fixed second derivatives of the
+    torques, shape (P, 3 nv, 3 nv). torques: weights of these second derivatives, (P, nv).
+    """
+
+    jacobian: Array
+    curvature: Array
+    torques: Array
+
+
+class ConditionOutputs:
+    """The values of conditions over their scales, between their bounds, in the tangent space.
 
     problem: on the grid whose points they are evaluated at.
     """
@@ -53,17 +68,21 @@ class ConditionOutputs(PointOutputs):
         return np.concatenate([each.y.values(at) / scale for each, scale in found], axis=1)
 
     def excess(self, trajectory: Trajectory, tolerance: float) -> Array:
-        """See PointOutputs: with the conditions' own tolerances."""
+        """The excess over lower and upper bounds in every interval, (2, N, K); -inf for none.
+
+        Between the points, too. What is tolerated is at most the tolerance, for which the
+        conditions' own ones are taken.
+        """
         parts = [excess_of(trajectory, each) - (each.tolerance - tolerance) for each in self.given]
         return np.concatenate(parts, axis=2)
 
     def worst(self, trajectory: Trajectory, tolerance: float) -> tuple[float, str]:
-        """The condition that is exceeded most, as a fraction of its scale, as by `excess`."""
+        """The largest excess, as by `excess`, and what exceeds its bound then, as a clause."""
         found = [(worst(trajectory, each), each.tolerance) for each in self.given]
         return max((over - (own - tolerance), clause) for (over, clause), own in found)
 
     def expand(self, at: Points, force: Array) -> ExpandedOutputs:
-        """Derivatives in (q, v, a): see the module."""
+        """Derivatives in (q, v, a): see the module. force: weights of the curvature, (P, K)."""
         n = at.v.shape[1]
         J = self._torque_slopes(at) if need_torques(self.given) else None
         slopes, first = [], 0

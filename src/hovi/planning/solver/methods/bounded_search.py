@@ -46,11 +46,10 @@ from hovi.planning.solver.missed_equations import (
     unmet_sentence,
 )
 from hovi.planning.solver.multipliers import Multipliers
-from hovi.planning.solver.near.beyond_margin import EXTRA_CLEARANCE
+from hovi.planning.solver.near.approaches import EXTRA_CLEARANCE
 from hovi.planning.solver.near.clearance_rows import ClearanceRows
 from hovi.planning.solver.near.cleared_action import ClearedAction
 from hovi.planning.solver.outcome.solution_factor import SolvedBounds
-from hovi.planning.solver.point_outputs import PointOutputs
 from hovi.scene.lagrangian import PointTerms
 from hovi.system.dataclass import dataclass
 from hovi.system.deadline import Deadline, raise_if_late
@@ -142,7 +141,7 @@ class BoundedSearch:
         return np.zeros((2, self.problem.grid.intervals, size))
 
     @property
-    def more(self) -> PointOutputs | None:
+    def more(self) -> ConditionOutputs | None:
         """What is bounded at the points next to limits: conditions."""
         found = ConditionOutputs(self.problem) if self.problem.bounds else None
         return found if found is not None and found.size > 0 else None

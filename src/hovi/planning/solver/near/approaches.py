@@ -13,7 +13,6 @@ from hovi.planning.clearance.clearance_violation import wanted_values
 from hovi.planning.clearance.distances import Distances
 from hovi.planning.clearance.fast_obstacles import FastPairs
 from hovi.planning.problem.problem import TrajectoryProblem
-from hovi.planning.solver.near.beyond_margin import EXTRA_CLEARANCE
 from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
@@ -34,6 +33,8 @@ the motion moves from step to step."""
 LEAST_SPACING = 1e-4
 """Distance of positions up to which one row is enough, relative to the interval, where a pair is
 too close by more than the extra clearance leaves."""
+EXTRA_CLEARANCE = 5e-4
+"""Clearance in rows beyond the margin, in DISTANCE_SCALE: 0.05 mm for the motion between."""
 USED = 0.7 * EXTRA_CLEARANCE * DISTANCE_SCALE
 """What a motion may use up of the extra clearance between rows, in [m]."""
 TOUCHING, AROUND, SHALLOW = 3e-4, 0.3, 0.01

@@ -31,7 +31,6 @@ from hovi.planning.solver.near.approaches import (
     spread,
     spread_approaches,
 )
-from hovi.planning.solver.near.beyond_margin import CUTOFF, saturated
 from hovi.planning.solver.near.expanded_rows import ExpandedRows, RowSums
 from hovi.planning.solver.near.recent_paths import RecentPaths
 from hovi.scene.lagrangian import PointTerms, over_time
@@ -49,6 +48,8 @@ MOST_INFLATION = 10.0
 """Bound of what a rounded distance is shorter by, relative to the size."""
 WEIGHT = 0.1
 """Weight of a row in a barrier, as a fraction of the interval."""
+CUTOFF = 1.0, 3.0
+"""Excess over the margin, in DISTANCE_SCALE, from which outputs level off, and are constant."""
 GUARD = 0.05
 """Distance beyond the least one below which pairs get rows at once, in [m]."""
 
@@ -352,3 +353,18 @@ class ClearanceRows:
 def _rounding_of(y: Array) -> Array:
     """Sizes by which the shapes of rows are rounded, in [m]. y: of the rows, (E,)."""
     return np.clip(ROUNDED_FRACTION * DISTANCE_SCALE * y, LEAST_ROUNDING, MOST_ROUNDING)
+
+
+def saturated(y: Array) -> tuple[Array, Array, Array]:
+    """phi(y) and its two derivatives, in DISTANCE_SCALE.
+
+    y up to the first CUTOFF, then width (x - x^3 + x^4/2) more with x in [0, 1], then constant.
+    """
+    near, far = CUTOFF
+    if not np.any(y > near):  # as mostly: rows are of near pairs
+        return y.copy(), np.ones_like(y), np.zeros_like(y)
+    width = far - near
+    x = np.clip((y - near) / width, 0.0, 1.0)
+    level = near + width * (x - x**3 + 0.5 * x**4)
+    slope, bend = (1.0 - x) ** 2 * (1.0 + 2.0 * x), -6.0 * x * (1.0 - x) / width
+    return np.where(y > near, level, y), slope, bend

@@ -19,12 +19,12 @@ from hovi.planning.problem.limits import Limits
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.action_objective import LinearAlgebra
 from hovi.planning.solver.bounded_action import BoundedAction
+from hovi.planning.solver.condition_outputs import ConditionOutputs
 from hovi.planning.solver.limits.limit_rows import LimitRows
 from hovi.planning.solver.multipliers import Multipliers
 from hovi.planning.solver.near.clearance_rows import ClearanceRows
 from hovi.planning.solver.near.expanded_rows import ExpandedRows
 from hovi.planning.solver.near.recent_paths import RecentPaths
-from hovi.planning.solver.point_outputs import PointOutputs
 from hovi.scene.lagrangian import PointTerms
 
 Array = npt.NDArray[np.float64]
@@ -56,7 +56,7 @@ class ClearedAction(BoundedAction):
         margins: Array | None,
         algebra: LinearAlgebra | None,
         multipliers: Multipliers | None,
-        more: PointOutputs | None,
+        more: ConditionOutputs | None,
         rows: LimitRows,
         near: ClearanceRows,
     ) -> None:
@@ -123,7 +123,7 @@ class ClearedAction(BoundedAction):
         other = None if near is None else near.without_negative_curvature()
         if near is None or other is None:
             return None
-        other.add_curvature(near.curvature, self.action.expansion.hessian)
+        other.add_curvature(other.curvature - near.curvature, self.action.expansion.hessian)
         self._near = other
         return self._under_equations(x, self.action.model_of_expansion())
 

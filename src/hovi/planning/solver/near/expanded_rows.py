@@ -65,8 +65,8 @@ class ExpandedRows:
     table: Array
     jacobian: Array
     curvature: Array
-    charts: Charts | None = None
-    order: int = 2
+    charts: Charts | None
+    order: int
 
     def without_negative_curvature(self) -> ExpandedRows | None:
         """The same with the positive part of the curvature at every instant.
@@ -109,10 +109,9 @@ class ExpandedRows:
         at = self.sums.by_instant(squares) + self.curvature
         self._add_at_instants(self._at_instants(forces), at, hessian)
 
-    def add_curvature(self, less: Array, hessian: Array) -> None:
-        """Add the curvature, less another one, (M, nv, nv), to the intervals' Hessians."""
-        none = np.zeros(self.curvature.shape[:2])
-        self._add_at_instants(none, self.curvature - less, hessian)
+    def add_curvature(self, curvature: Array, hessian: Array) -> None:
+        """Add a curvature at the instants, (M, nv, nv), to the intervals' Hessians."""
+        self._add_at_instants(np.zeros(curvature.shape[:2]), curvature, hessian)
 
     def _at_instants(self, forces: Array) -> Array:
         """The forces on rows as those on the configurations, (M, nv)."""

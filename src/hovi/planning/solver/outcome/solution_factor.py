@@ -26,8 +26,9 @@ from hovi.optimize.banded_model import BandModel
 from hovi.optimize.barrier import Barrier
 from hovi.optimize.criteria import Criteria
 from hovi.optimize.ended import Reason
+from hovi.optimize.equation_model import EquationModel
 from hovi.optimize.interior_point import minimize_bounded
-from hovi.optimize.kkt_model import ConstraintRows, KktFactor, KktLayout, KktModel
+from hovi.optimize.kkt_model import ConstraintRows, KktFactor, KktModel
 from hovi.optimize.start import Start
 from hovi.planning.problem.limits import no_limits
 from hovi.planning.problem.problem import TrajectoryProblem
@@ -84,7 +85,7 @@ class SolutionFactor:
         equations.
     strictness: the least, over all bounds, of the larger one of the multiplier, relative to the
         mean density of the cost, and the gap, relative to the range; infinite without bounds, and
-        some 1e-6 at limits that hold for a while, where one row after the other begins to act.
+        small at limits that hold for a while, where one row after the other begins to act.
     """
 
     problem: TrajectoryProblem
@@ -116,19 +117,18 @@ class SolutionFactor:
         if known is not None:
             path, known = known.sharpened(path)
         objective = known.objective if known else _unlimited(problem, path)
-        y = objective.outputs(path).y
-        barrier = known.barrier if known else Barrier.inactive(objective.bounds, y)
+        outputs = objective.outputs(path)
+        barrier = known.barrier if known else Barrier.inactive(objective.bounds, outputs.y)
         model = _exact_model(objective, path, barrier.multipliers)
         if known is None and problem.constrained:
-            change = _kkt(objective, path, model, []).least_squares_multipliers()
-            objective.hold(change)
+            objective.hold(objective.action.kkt(path, model).least_squares_multipliers())
             model = _exact_model(objective, path, barrier.multipliers)
-        density = objective.outputs(path).density(objective.bounds.measure)
-        active, strictness = _active(barrier, density)
+        active, strictness = _active(barrier, outputs.density(objective.bounds.measure))
         rows = _rows_of(objective, model, np.flatnonzero(active))
-        system = _kkt(objective, path, model, rows)
-        _require_stationary(system, abs(objective.outputs(path).value))
-        return cls(problem, path, system, int(active.sum()), strictness)
+        system = objective.action.kkt(path, model, rows)
+        found = cls(problem, path, system, int(active.sum()), strictness)
+        found._require_stationary(abs(outputs.value))
+        return found
 
     @cached_property
     def factor(self) -> KktFactor:
@@ -158,11 +158,8 @@ class SolutionFactor:
 
     def cost_slopes(self, end: EndName) -> Array:
         """d cost / d(q, v, ...) at an end, shape (k, nv); zero in free components."""
-        slopes = np.zeros(self.problem.free_ends[0].shape)
-        for j, i in np.argwhere(~self.problem.free_ends[self._number(end)]):
-            moved = self._end_columns(end, j, i)
-            slopes[j, i] = np.vdot(self.system.plain.intervals.gradient, moved)
-        return slopes
+        slopes = self._at_end(end, self.system.plain.intervals.gradient)
+        return np.where(self.problem.free_ends[self._number(end)], 0.0, slopes)
 
     def cost_curvature(self, end: EndName) -> Array:
         """d2 cost / d(q, v, ...)^2 at an end, shape (k nv, k nv), symmetric.
@@ -171,17 +168,26 @@ class SolutionFactor:
         and NaN where the motion has no freedom to follow.
         """
         free = self.problem.free_ends[self._number(end)]
-        k, n = free.shape
-        curvature, given = np.zeros((k * n, k * n)), np.argwhere(~free)
-        hessian = self.system.plain.intervals.hessian
-        for j, i in given:
+        curvature, hessian = (
+            np.zeros((*free.shape, *free.shape)),
+            self.system.plain.intervals.hessian,
+        )
+        for j, i in np.argwhere(~free):
             columns, z = self._moved_columns(end, j, i)
-            force = np.einsum("kcdab,kdb->kca", hessian, columns)
-            force += self.system.pulled_columns(z)
-            for row, a in given:
-                moved = self._end_columns(end, row, a)
-                curvature[row * n + a, j * n + i] = np.vdot(force, moved)
-        return np.asarray(0.5 * (curvature + curvature.T))
+            force = np.einsum("kcdab,kdb->kca", hessian, columns) + self.system.pulled_columns(z)
+            curvature[:, :, j, i] = np.where(free, 0.0, self._at_end(end, force))
+        flat = curvature.reshape(free.size, free.size)
+        return np.asarray(0.5 * (flat + flat.T))
+
+    def _require_stationary(self, cost: float) -> None:
+        """Raise InputError unless a Newton step leads to next to no decrease."""
+        s, _ = self.factor.solve(-self.system.gradient, np.zeros(self.system.equations))
+        decrease = 0.5 * abs(float(s @ self.system.gradient))
+        if not decrease <= STATIONARY * cost + np.finfo(float).tiny:
+            raise InputError(
+                "the factor is that of a motion at which the cost is stationary, and this one is "
+                "not: see the solution's message, and plan with more time or steps."
+            )
 
     def _number(self, end: EndName) -> int:
         if not isinstance(end, str) or end not in ("start", "goal"):
@@ -194,10 +200,15 @@ class SolutionFactor:
             )
         return int(end == "goal")
 
+    def _at_end(self, end: EndName, force: Array) -> Array:
+        """A covector of the intervals' columns, (N, m, n), as one of (q, v, ...) at an end."""
+        k, h = self.problem.ld.k, self.problem.grid.steps
+        mine, step = (force[0, :k], h[0]) if end == "start" else (force[-1, k : 2 * k], h[-1])
+        return np.asarray(mine * step ** np.arange(k)[:, None])
+
     def _end_columns(self, end: EndName, order: int, joint: int) -> Array:
         """The intervals' columns where one component of an end moves by one, (N, m, n)."""
-        problem = self.problem
-        k, h = problem.ld.k, problem.grid.steps
+        k, h = self.problem.ld.k, self.problem.grid.steps
         columns = np.zeros_like(self.system.plain.intervals.gradient)
         if end == "start":
             columns[0, order, joint] = h[0] ** order
@@ -217,17 +228,6 @@ class SolutionFactor:
         return columns, z
 
 
-def _require_stationary(system: KktModel, cost: float) -> None:
-    """Raise InputError unless a Newton step leads to next to no decrease."""
-    s, _ = system.exact_factor().solve(-system.gradient, np.zeros(system.equations))
-    decrease = 0.5 * abs(float(s @ system.gradient))
-    if not decrease <= STATIONARY * cost + np.finfo(float).tiny:
-        raise InputError(
-            "the factor is that of a motion at which the cost is stationary, and this one is not: "
-            "see the solution's message, and plan with more time or steps."
-        )
-
-
 def _unlimited(problem: TrajectoryProblem, path: DiscretePath) -> BoundedAction:
     """The objective of a problem without limits, with multipliers of equations that are zero."""
     known = first_multipliers(problem, path) if problem.constrained else None
@@ -237,15 +237,12 @@ def _unlimited(problem: TrajectoryProblem, path: DiscretePath) -> BoundedAction:
 def _exact_model(objective: BoundedAction, path: DiscretePath, multipliers: Array) -> BandModel:
     """The Hessian of the Lagrangian and its gradient at a path, without equations and barrier."""
     objective.predict([])
-    tolerances, objective.tolerances = objective.tolerances, None
-    try:
-        none = np.zeros_like(multipliers)
-        model = objective.model(path, none, multipliers, multipliers)
-    finally:
-        objective.tolerances = tolerances
-    if not isinstance(model, BandModel):
+    none = np.zeros_like(multipliers)
+    model = objective.model(path, none, multipliers, multipliers)
+    plain = model.inner if isinstance(model, EquationModel) else model
+    if not isinstance(plain, BandModel):
         raise InputError("the factor needs a grid of at most 1,000 intervals; use fewer.")
-    return model
+    return plain
 
 
 def _active(barrier: Barrier, density: float) -> tuple[npt.NDArray[np.bool_], float]:
@@ -277,19 +274,3 @@ def _rows_of(objective: BoundedAction, model: BandModel, outputs: Index) -> list
         family = np.full(count, n + 1)  # those of passive joints are up to n
         rows.append(ConstraintRows(numbers, own.reshape(len(numbers), count, m, n), family))
     return rows
-
-
-def _kkt(
-    objective: BoundedAction, path: DiscretePath, model: BandModel, bounds: list[ConstraintRows]
-) -> KktModel:
-    """The system with the rows of equations and bounds."""
-    action, structure = objective.action, objective.problem.structure
-    rows, m, n = list(bounds), *model.intervals.gradient.shape[1:]
-    if action.multipliers is not None:
-        rows = [*action.equations.rows(path, action.expansion, action.jets(path)), *rows]
-    none = ConstraintRows(np.zeros(0, np.intp), np.zeros((0, 1, m, n)))
-    rows = rows or [none]
-    layout = KktLayout.of(structure.layout, rows)
-    bands = structure.metric_band, layout.extended(structure.metric_band)
-    still = np.zeros(len(layout.multipliers))
-    return KktModel(model.intervals, rows, still, layout, *bands)
