@@ -158,8 +158,8 @@ class SolutionFactor:
 
     def cost_slopes(self, end: EndName) -> Array:
         """d cost / d(q, v, ...) at an end, shape (k, nv); zero in free components."""
-        slopes = self._at_end(end, self.system.plain.intervals.gradient)
-        return np.where(self.problem.free_ends[self._number(end)], 0.0, slopes)
+        free = self.problem.free_ends[self._number(end)]
+        return np.where(free, 0.0, self._at_end(end, self.system.plain.intervals.gradient))
 
     def cost_curvature(self, end: EndName) -> Array:
         """d2 cost / d(q, v, ...)^2 at an end, shape (k nv, k nv), symmetric.
