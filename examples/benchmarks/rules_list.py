@@ -891,7 +891,7 @@ _at("refinement", "planning.refinement.adaptive")
 _rule(
     "begin again with more points",
     "A first grid of few points far from a finer motion is replaced by one of more points.",
-    "_Search._refine",
+    "Refinement._refine",
     "self.restart is not None and _hides(candidate)",
     "False",
 )
@@ -905,21 +905,21 @@ _rule(
 _rule(
     "guess first, then near",
     "Within limits a solve on another grid begins as from a guess, then as near a solution.",
-    "_Search._solved",
+    "Refinement._solved",
     "(True,) if problem.distances is not None else (guessed, True)",
     "(True,)",
 )
 _rule(
     "continued at its iteration limit",
     "Within limits a solve at its iteration limit is continued once.",
-    "_Search._solved",
+    "Refinement._solved",
     "solution.status is Status.ITERATION_LIMIT and problem.limited",
     "False",
 )
 _rule(
     "end where grids do not help",
     "Two grids that do not halve the error end the refinement.",
-    "_Search._stop_reason",
+    "Refinement._stop_reason",
     "stalled >= MAX_STALLED_ROUNDS",
     "False",
 )

@@ -24,9 +24,10 @@ from hovi.planning.refinement.error_estimate import (
 from hovi.planning.refinement.hp_refinement import galerkin_with_more_points
 from hovi.planning.refinement.next_grid import interpolated_to, next_grid
 from hovi.planning.solver.central_path import CentralPath
-from hovi.planning.solver.solver import Solution, solve_on_grid
+from hovi.planning.solver.solver import Solution, solved_on_grid
 from hovi.planning.solver.status import Status
 from hovi.schemes import galerkin
+from hovi.system.blas_threads import one_blas_thread
 from hovi.system.dataclass import dataclass
 from hovi.system.deadline import Deadline, OutOfTimeError
 from hovi.system.interruption import (
@@ -78,6 +79,7 @@ def first_grid(
     return Grid.uniform(duration, max(few * number // many, 1), table(FIRST_MODES, order))
 
 
+@one_blas_thread
 @interruptible
 def solve_to_tolerance(
     problem: TrajectoryProblem,
@@ -95,56 +97,38 @@ def solve_to_tolerance(
     The solution's `accuracy` reports the estimated error, and why the tolerance was not reached.
     """
     deadline = Deadline(time_limit)
-    first = solve_on_grid(
+    first = solved_on_grid(
         problem,
         guess,
         max_iterations=max_iterations,
         time_limit=time_limit,
         barrier=tolerance.barrier,
     )
-    return refine_to_tolerance(
-        first,
-        tolerance,
-        max_iterations=max_iterations,
-        time_limit=deadline.seconds_left,
-        on_round=on_round,
-    )
-
-
-@interruptible
-def refine_to_tolerance(
-    solution: Solution,
-    tolerance: Tolerance,
-    *,
-    max_iterations: int = MAX_ITERATIONS,
-    time_limit: float | None = None,
-    on_round: OnRound | None = None,
-    restart: Callable[[], Solution] | None = None,
-) -> Solution:
-    """Refine a solution to a tolerance; arguments as for `solve_to_tolerance`.
-
-    Within limits alone a solve at its iteration limit is continued once.
-    restart: returns the solution to begin with if the given one is not near a finer one; None to
-        keep the given one.
-    """
-    deadline = Deadline(time_limit)
-    return _Search(tolerance, max_iterations, deadline, on_round, restart).run(solution)
+    return Refinement(tolerance, max_iterations, deadline, on_round).run(first)
 
 
 @dataclass(eq=False)
-class _Search:
-    """The rounds of a refinement, with their common limits on steps and time."""
+class Refinement:
+    """The rounds of a refinement to a tolerance, with their common limits on steps and time.
+
+    max_iterations, on_round: as for `solve_to_tolerance`. deadline: of all rounds.
+    restart: returns the solution to begin with if the given one is not near a finer one; None to
+        keep the given one.
+    """
 
     tolerance: Tolerance
     max_iterations: int
     deadline: Deadline
-    on_round: OnRound | None
-    restart: Callable[[], Solution] | None
+    on_round: OnRound | None = None
+    restart: Callable[[], Solution] | None = None
     rounds: list[Round] = field(default_factory=list)
     best: Candidate = field(init=False)
 
     def run(self, solution: Solution) -> Solution:
-        """Refine until the error is within the tolerance, or no further progress is possible."""
+        """A solution refined until its error is within the tolerance, or nothing more helps.
+
+        Within limits alone a solve at its iteration limit is continued once.
+        """
         self.best = Candidate(solution, self.tolerance)
         try:
             self.best = self._evaluated(solution)  # also without time for another grid
@@ -253,7 +237,7 @@ class _Search:
         # limits alone a solve from the guess takes fewer steps, where it ends well.
         guessed = isinstance(guess, Trajectory)
         for near in (True,) if problem.distances is not None else (guessed, True):
-            solution = solve_on_grid(
+            solution = solved_on_grid(
                 problem,
                 Start(guess, along, None if along is None else LEVEL, near),
                 max_iterations=self.max_iterations,

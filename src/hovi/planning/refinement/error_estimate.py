@@ -32,7 +32,8 @@ from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.central_path import CentralPath
 from hovi.planning.solver.outcome.cost_with_time import cost_of, price_of_time
 from hovi.planning.solver.receding.last_motion import satisfies
-from hovi.planning.solver.solver import Solution, solve_on_grid
+from hovi.planning.solver.solver import Solution, solved_on_grid
+from hovi.system.blas_threads import one_blas_thread
 from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
@@ -59,6 +60,7 @@ MAX_FINER_STEPS = 80
 
 
 @check_arguments
+@one_blas_thread
 def estimate_error(solution: Solution, frame: str | None = None) -> MotionError | None:
     """The estimated error of a solution, over the whole motion.
 
@@ -202,7 +204,7 @@ def _finished(found: FinerSolution, barrier: float) -> Solution | None:
     ):
         return dataclasses.replace(known, central=known.central.freed())
     start = Start(known.trajectory.path, known.central.freed(), near=True)
-    solution = solve_on_grid(known.problem, start, barrier=barrier)
+    solution = solved_on_grid(known.problem, start, barrier=barrier)
     return solution if solution.success else None
 
 
@@ -231,7 +233,7 @@ def finer_solution(
     if found is not None:
         costs = found.value + price, known + price
         return FinerSolution(fine, found.path, *costs, gains, found.solution)
-    solution = solve_on_grid(fine, start, max_iterations=MAX_FINER_STEPS, time_limit=time_limit)
+    solution = solved_on_grid(fine, start, max_iterations=MAX_FINER_STEPS, time_limit=time_limit)
     if not solution.success:
         return None
     path, cost = solution.trajectory.path, solution.cost
@@ -250,7 +252,7 @@ def _solved(
 
     Its gains are the cost of the difference of the torques: see `_cost_of_difference`.
     """
-    solution = solve_on_grid(fine, start, time_limit=time_limit, barrier=barrier)
+    solution = solved_on_grid(fine, start, time_limit=time_limit, barrier=barrier)
     if not solution.success or solution.problem is None:
         return None
     finer = solution.trajectory

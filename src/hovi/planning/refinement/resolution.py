@@ -44,7 +44,7 @@ from hovi.planning.solver.methods.stationary import Stationary
 from hovi.planning.solver.outcome.cost_with_time import cost_of
 from hovi.planning.solver.outcome.judge import judged, without_success
 from hovi.planning.solver.receding.shift import Shift
-from hovi.planning.solver.solver import Check, MotionCheck, Solution, solve_on_grid
+from hovi.planning.solver.solver import Check, MotionCheck, Solution, solved_on_grid
 from hovi.planning.solver.status import Status
 from hovi.system.blas_threads import one_blas_thread
 from hovi.system.dataclass import dataclass
@@ -75,6 +75,8 @@ _NO_FINER_MINIMUM = "no minimum was found near it on a finer grid"
 
 
 @check_arguments
+@one_blas_thread
+@interruptible
 def solve(
     problem: TrajectoryProblem,
     guess: str | Trajectory | DiscretePath = "cubic",
@@ -107,7 +109,7 @@ def solve(
     """
     if seek == "stationary":
         method = method or Stationary()
-    found = solve_on_grid(
+    found = solved_on_grid(
         problem,
         guess,
         max_iterations=max_iterations,
@@ -312,7 +314,7 @@ def _compared_with_stationary(solution: Solution) -> tuple[Solution, str]:
     problem = solution.problem
     assert problem is not None
     start = prolonged(solution.trajectory.path, problem.finer.grid)
-    finer = solve_on_grid(problem.finer, start, method=Stationary())
+    finer = solved_on_grid(problem.finer, start, method=Stationary())
     if not finer.success:
         return solution, "no stationary point was found near it on a finer grid"
     if finer.n_neg != solution.n_neg:

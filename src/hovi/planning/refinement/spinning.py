@@ -16,7 +16,7 @@ from hovi.discrete.measures.motion_error import relative_difference
 from hovi.errors import HoviError
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.refinement.error_estimate import MAX_FINER_STEPS, FinerSolution, finer_than
-from hovi.planning.solver.solver import Solution, solve_on_grid
+from hovi.planning.solver.solver import Solution, solved_on_grid
 from hovi.robot.mass_matrix import MassMatrix
 from hovi.system.dataclass import dataclass
 
@@ -143,7 +143,7 @@ def _is_confirmed(known: Solution, spins: bool, far: float) -> bool:
     """
     assert known.problem is not None
     halves = known.problem.on(known.problem.grid.halved())
-    found = solve_on_grid(halves, known.trajectory, max_iterations=MAX_FINER_STEPS)
+    found = solved_on_grid(halves, known.trajectory, max_iterations=MAX_FINER_STEPS)
     if not found.success:
         return False
     if spins:
@@ -155,7 +155,7 @@ def _finished(finer: FinerSolution) -> Solution | None:
     """The minimum that the finer solution is, or leads to; None if there is none."""
     known = finer.finish()
     if known is None:
-        known = solve_on_grid(finer.problem, finer.path, max_iterations=MAX_FINER_STEPS)
+        known = solved_on_grid(finer.problem, finer.path, max_iterations=MAX_FINER_STEPS)
     return known if known.success else None
 
 

@@ -37,7 +37,7 @@ from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.search.job import Job
 from hovi.planning.search.options import PlanOptions
 from hovi.planning.solver.initial_path import guess_path
-from hovi.planning.solver.solver import Solution, solve_on_grid
+from hovi.planning.solver.solver import Solution, solved_on_grid
 from hovi.planning.solver.status import Status
 from hovi.scene.scene import Scene
 from hovi.schemes import by_name, of_order
@@ -231,7 +231,7 @@ class _Choice:
         """A motion between the same ends that is clear of obstacles and of the robot itself."""
         problem = self._problem(motion.pair, clear=True)
         guess = guess_path(problem, motion.found.trajectory)
-        found = solve_on_grid(problem, guess, max_iterations=STEPS, barrier=LAST_BARRIER)
+        found = solved_on_grid(problem, guess, max_iterations=STEPS, barrier=LAST_BARRIER)
         return _Motion(motion.pair, found)
 
     def starts(self) -> list[State]:
@@ -301,7 +301,7 @@ class _Choice:
                 for number, curve in self._guesses(pairs):
                     problem = self._problem(pairs[number])
                     guess = "cubic" if curve is None else problem.path(curve)
-                    solution = solve_on_grid(
+                    solution = solved_on_grid(
                         problem, guess, max_iterations=STEPS, barrier=LAST_BARRIER
                     )
                     motion, known = _Motion(pairs[number], solution), found.get(number)

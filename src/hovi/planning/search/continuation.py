@@ -17,7 +17,7 @@ from hovi.errors import HoviError
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.limits import Limits
 from hovi.planning.search.job import Job
-from hovi.planning.solver.solver import Solution, solve_on_grid
+from hovi.planning.solver.solver import Solution, solved_on_grid
 from hovi.planning.solver.status import Status
 from hovi.system.deadline import Deadline
 from hovi.system.interruption import record_interrupt
@@ -69,7 +69,7 @@ def solve_by_continuation(
             if progress is not None:
                 text = f"a duration of {stage.grid.duration:.4g} s" if longer else MORE_STEPS
                 progress(f"continuation: {text}", i / len(stages))
-            last = solve_on_grid(
+            last = solved_on_grid(
                 stage.problem(),
                 guess,
                 max_iterations=job.options.max_iterations,

@@ -17,7 +17,7 @@ from hovi.planning.problem.clock import Clock
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.problem.time_price import TimePrice
 from hovi.planning.problem.tolerance import Round, Tolerance
-from hovi.planning.refinement.adaptive import first_grid, refine_to_tolerance
+from hovi.planning.refinement.adaptive import Refinement, first_grid
 from hovi.planning.refinement.faults.narrow_features import features_of
 from hovi.planning.refinement.inactive_limits import (
     far_from_limits,
@@ -28,7 +28,7 @@ from hovi.planning.search.free_duration import FreeDuration, SolveFor
 from hovi.planning.search.job import Job, split_for_charts
 from hovi.planning.search.multistart import Pool, default_processes, distinct
 from hovi.planning.solver.initial_path import guess_path
-from hovi.planning.solver.solver import Solution, solve_on_grid
+from hovi.planning.solver.solver import Solution, solved_on_grid
 from hovi.planning.solver.status import Status
 from hovi.schemes import is_galerkin
 from hovi.system.dataclass import dataclass
@@ -185,18 +185,19 @@ class FinalStages:
 
     def refined(self, tolerance: Tolerance, which: str, known: Solution) -> Solution:
         """A minimum to a tolerance, refined without its limits if it is far from them."""
-        refine = partial(
-            refine_to_tolerance,
-            tolerance=tolerance,
-            max_iterations=self.fine.options.max_iterations,
-            on_round=partial(self._report_round, which),
-            restart=self._from_guess if has_few_points(self.fine) else None,
+        refinement = partial(
+            Refinement,
+            tolerance,
+            self.fine.options.max_iterations,
+            self.deadline,
+            partial(self._report_round, which),
+            self._from_guess if has_few_points(self.fine) else None,
         )
-        better = None
         if far_from_limits(known):
-            free = refine(without_limits(known), time_limit=self.deadline.seconds_left)
-            better = with_limits_again(free, known)
-        return refine(known, time_limit=self.deadline.seconds_left) if better is None else better
+            better = with_limits_again(refinement().run(without_limits(known)), known)
+            if better is not None:
+                return better
+        return refinement().run(known)
 
     def seeing_features(self, tolerance: Tolerance, best: Solution) -> Solution:
         """The minimum on grids with nodes where its points miss a narrow feature of an effect.
@@ -227,7 +228,7 @@ class FinalStages:
         job = with_more_points(self.fine)
         left, most = self.deadline.seconds_left, job.options.max_iterations
         guess, barrier = job.options.guess, job.barrier
-        return solve_on_grid(
+        return solved_on_grid(
             job.problem(), guess, max_iterations=most, time_limit=left, barrier=barrier
         )
 
@@ -289,7 +290,7 @@ class FinalStages:
 
     def _solve(self, job: Job, guess: Trajectory | Start[DiscretePath, None]) -> Solution:
         left, most = self.deadline.seconds_left, job.options.max_iterations
-        return solve_on_grid(job.problem(), guess, max_iterations=most, time_limit=left)
+        return solved_on_grid(job.problem(), guess, max_iterations=most, time_limit=left)
 
 
 def ended_early(best: Solution, status: Status, why: str) -> Solution:

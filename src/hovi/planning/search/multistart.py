@@ -27,7 +27,7 @@ from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.search.continuation import UNUSABLE
 from hovi.planning.search.free_duration import FreeDuration
 from hovi.planning.search.job import Job
-from hovi.planning.solver.solver import Solution, solve_on_grid
+from hovi.planning.solver.solver import Solution, solved_on_grid
 from hovi.planning.solver.status import Status
 from hovi.robot.robot import Robot
 from hovi.system.dataclass import dataclass
@@ -86,7 +86,7 @@ class Pool:
     def solve_all(
         self, guesses: Sequence[DiscretePath], lengths: Sequence[float | None] | None = None
     ) -> Solved:
-        """The solutions from the guesses, without those whose process died.
+        """The solutions from the guesses, without those whose process died or had no time left.
 
         lengths: of a free part with which each begins, in [s]; that of the job for None.
         If worker processes cannot be started, the guesses are solved in this one. Raises
@@ -98,7 +98,13 @@ class Pool:
         try:
             if min(self.processes, len(starts)) > 1:
                 self._in_workers(starts, results)
-            self._here(starts, results)
+            for i in (i for i in range(len(starts)) if i not in results):
+                if results and self.deadline.passed:
+                    break
+                left = self.deadline.seconds_left
+                results[i] = solution = _solve(self.job, self.free, starts[i], left)
+                if solution.status is Status.INTERRUPTED:
+                    break
         except KeyboardInterrupt:
             record_interrupt()
             if not results:
@@ -114,18 +120,6 @@ class Pool:
         found = results_in_workers(work, starts, self.processes, self.deadline)
         with closing(found):
             results.update(found)
-
-    def _here(self, starts: Sequence[_Begun], results: dict[int, Solution | Lost]) -> None:
-        """Add the results that are missing; none of them if the time limit is why."""
-        for i, start in enumerate(starts):
-            if i in results:
-                continue
-            if results and self.deadline.passed:
-                return
-            left = self.deadline.seconds_left
-            results[i] = solution = _solve(self.job, self.free, start, left)
-            if solution.status is Status.INTERRUPTED:
-                return
 
 
 def _solved(results: dict[int, Solution | Lost], interrupted: bool = False) -> Solved:
@@ -167,7 +161,7 @@ def _solve(
             barrier=job.barrier,
         )
     if solution is None:
-        solution = solve_on_grid(
+        solution = solved_on_grid(
             problem,
             guess,
             max_iterations=most,

@@ -24,7 +24,6 @@ from hovi.planning.problem.goals import Via
 from hovi.planning.problem.notation.ends import End, as_end
 from hovi.planning.problem.notation.goal_turns import says_turns, turns_sentence
 from hovi.planning.problem.notation.smoothing import smoothed
-from hovi.planning.problem.notation.supported import require_given_duration
 from hovi.planning.problem.presolve.assumptions import assumptions
 from hovi.planning.problem.presolve.findings import findings
 from hovi.planning.problem.presolve.length_slips import grasped_slips
@@ -180,7 +179,7 @@ def _planned(
         return with_notes(nothing, [job.scene], job.options, apart, seconds)
     search = planning.search(job, deadline, progress or silent)
     reason = "" if search.ends is None else search.ends.reason
-    found = infeasible_at_once(longest, chosen.guess, reason) if reason else run(search, began)
+    found = infeasible_at_once(longest, chosen.guess, reason) if reason else search.run(began)
     return with_notes(found, [search.fine.scene], search.fine.options, apart)
 
 
@@ -239,23 +238,6 @@ def _notes(found: Solution, scenes: Sequence[Scene], options: PlanOptions) -> It
             f"{link!r} and {other!r} are {gap:.2g} m nearer than the margin at an end, and may be "
             "so all along.",
         )
-
-
-def run(search: Search, began: float) -> Solution:
-    """The best solution of a search, with its times. began: of the plan, by the clock."""
-    for job in filter(None, (search.fine, search.without)):
-        job.problem()  # outside of the deadline: every solution has its problem
-    if search.free is not None or (search.segments is not None and search.segments.any):
-        require_given_duration(search.fine.problem())
-    started = time.perf_counter()
-    with search.deadline.in_force():
-        best, minima = search.run()
-    return dataclasses.replace(
-        best,
-        minima=minima,
-        setup_seconds=started - began,
-        solve_seconds=time.perf_counter() - started,
-    )
 
 
 @dataclass(frozen=True, eq=False)

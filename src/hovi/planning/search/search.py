@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import time
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Self
 
@@ -14,6 +15,7 @@ from hovi.errors import InputError
 from hovi.planning.clearance.clearance_violation import near_pairs
 from hovi.planning.paths.first_guesses import FirstGuesses, first_guesses
 from hovi.planning.problem.clock import Clock
+from hovi.planning.problem.notation.supported import require_given_duration
 from hovi.planning.problem.presolve.ramps import graded_to_ramps
 from hovi.planning.refinement.error_estimate import with_metadata
 from hovi.planning.refinement.faults.narrow_features import NARROW
@@ -74,15 +76,30 @@ class Search:
     segments: FreeSegments | None = None
     halved: bool = False
 
-    def run(self) -> tuple[Solution, tuple[float, ...]]:
+    def run(self, began: float) -> Solution:
+        """The best solution, with its times. began: of the plan, by the clock."""
+        for job in filter(None, (self.fine, self.without)):
+            job.problem()  # outside of the deadline: every solution has its problem
+        if self._free:
+            require_given_duration(self.fine.problem())
+        started = time.perf_counter()
+        with self.deadline.in_force():
+            best, minima = self._run() if self.without is None else self._without(self.without)
+        return dataclasses.replace(
+            best,
+            minima=minima,
+            setup_seconds=started - began,
+            solve_seconds=time.perf_counter() - started,
+        )
+
+    def _without(self, job: Job) -> tuple[Solution, tuple[float, ...]]:
         """The best solution, and the costs of all minima on the requested grid.
 
         Most motions keep links apart without being asked to. So where that is asked, the motion
         without is found first, which takes less time and is a minimum of both problems then.
+        job: without self-collision.
         """
-        if self.without is None:
-            return self._run()
-        best, costs = dataclasses.replace(self, fine=self.without)._run()
+        best, costs = dataclasses.replace(self, fine=job)._run()
         try:
             whole = self._of_whole(best)
         except OutOfTimeError:
@@ -94,7 +111,7 @@ class Search:
         return self._over_branches() if whole is None else (whole, costs)
 
     def _over_branches(self) -> tuple[Solution, tuple[float, ...]]:
-        """As `run`, with all distances: the better one of the chosen branch and another.
+        """As `_run`, or for another branch of the ends, if that is better.
 
         The branch was chosen by motions in which links may meet; the other one by motions in which
         they do not.
@@ -130,7 +147,7 @@ class Search:
         return dataclasses.replace(kept, check=Resolution.of(kept)) if known else kept
 
     def _run(self) -> tuple[Solution, tuple[float, ...]]:
-        """As `run`, with all distances from the beginning."""
+        """The best solution, and the costs of all minima, with all distances from the beginning."""
         job = self._coarse()
         explored = self._explored(job)
         if self._needs_more_points(explored):

@@ -24,7 +24,6 @@ from hovi.planning.search.planner import (
     ends_of,
     kept_apart,
     plan,
-    run,
     warn_of_ends,
     with_notes,
 )
@@ -172,7 +171,7 @@ def _planned(
     without = job.with_options(self_collision=False) if options.self_collision else None
     if fault := job.fault_of_time:
         return unresolved_at_once(job.problem(), job.options.guess, fault), job
-    return run(Search(job, deadline, progress, None, without, None, free), began), job
+    return Search(job, deadline, progress, None, without, None, free).run(began), job
 
 
 def _alone(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
 from dataclasses import field
 from typing import TYPE_CHECKING, Any
 
@@ -28,6 +27,10 @@ from hovi.system.interruption import record_interrupt
 if TYPE_CHECKING:
     from hovi.planning.solver.central_path import CentralPath
     from hovi.planning.solver.outcome.solution_factor import SolvedBounds
+
+
+STOPS = KeyboardInterrupt, OutOfTimeError
+"""What ends a solve from outside: Ctrl-C, and the end of its time."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,15 +114,12 @@ def _undecided(problem: TrajectoryProblem, motion: Trajectory) -> list[Caution]:
     return [Caution(SAMPLED, each) for each in sentences if each]
 
 
-def answered(solve: Callable[[], Answer], stopped: Callable[[Reason], Answer]) -> Answer:
-    """What a solve answers, or what there is where Ctrl-C or its time limit end it.
+def why_stopped(stopped: BaseException) -> Reason:
+    """Why a solve ended, where one of STOPS did between its iterations; Ctrl-C is recorded.
 
-    Iterations return their current point themselves; this is for the time between them.
+    Iterations return their current point themselves.
     """
-    try:
-        return solve()
-    except KeyboardInterrupt:
-        record_interrupt()
-        return stopped(Reason.INTERRUPTED)
-    except OutOfTimeError:
-        return stopped(Reason.TIME_LIMIT)
+    if isinstance(stopped, OutOfTimeError):
+        return Reason.TIME_LIMIT
+    record_interrupt()
+    return Reason.INTERRUPTED

@@ -9,13 +9,13 @@ import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import field
-from functools import cached_property, partial
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
-from hovi.checks.arguments import check_arguments
+from hovi.checks.arguments import check_arguments, without_checks
 from hovi.discrete.grid import DiscretePath, Grid
 from hovi.discrete.instants import Instants
 from hovi.discrete.measures.motion_effort import effort_of
@@ -32,7 +32,7 @@ from hovi.planning.problem.notation.ends import End
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.problem.tolerance import LAST_BARRIER, REMAINING_FRACTION, Accuracy
 from hovi.planning.problem.units import as_time_limit, seconds
-from hovi.planning.solver.answer import Answer, answered
+from hovi.planning.solver.answer import STOPS, Answer, why_stopped
 from hovi.planning.solver.initial_path import guess_path, turned_on
 from hovi.planning.solver.limits.row_forces import at_instants
 from hovi.planning.solver.methods.choice import method_for
@@ -419,13 +419,16 @@ def solve_on_grid(
         enough=REMAINING_FRACTION * barrier,
     )
     started, start = time.perf_counter(), dataclasses.replace(begun, x=path)
-
-    def solved() -> Answer:
+    try:
         with Deadline(time_limit).in_force():
-            return method.minimize(problem, start, criteria, report)
-
-    result = answered(solved, partial(_the_guess, problem, path))
+            result = method.minimize(problem, start, criteria, report)
+    except STOPS as stopped:
+        result = _the_guess(problem, path, why_stopped(stopped))
     return solution_of(result, started - began, time.perf_counter() - started)
+
+
+solved_on_grid = without_checks(solve_on_grid)
+"""`solve_on_grid` within a public call, which has checked its arguments and takes interrupts."""
 
 
 def solution_of(result: Answer, setup_seconds: float = 0.0, solve_seconds: float = 0.0) -> Solution:

@@ -7,7 +7,6 @@ or halvings of intervals, a solve moves the motion and the lengths.
 from __future__ import annotations
 
 import dataclasses
-from functools import partial
 
 import numpy as np
 import numpy.typing as npt
@@ -22,7 +21,7 @@ from hovi.optimize.start import Start
 from hovi.planning.problem.limits import Limits
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.problem.time_price import TimePrice
-from hovi.planning.solver.answer import Answer, answered
+from hovi.planning.solver.answer import STOPS, Answer, why_stopped
 from hovi.planning.solver.free_duration.timed_bounded_action import TimedBoundedAction
 from hovi.planning.solver.free_duration.timed_path import TimedPath, stretched_path
 from hovi.planning.solver.methods.bounded_search import (
@@ -60,7 +59,11 @@ def minimum_within_limits(
     """A motion of least S + w sum L within limits, from a guess for the problem's L; and its L."""
     known = problem, limits, criteria, None, start
     search = TimedSearch(*known, price=price, lengths=lengths)
-    return answered(partial(_searched, search), partial(_ended, search)), search.lengths
+    try:
+        found = _searched(search)
+    except STOPS as stopped:
+        found = _ended(search, why_stopped(stopped))
+    return found, search.lengths
 
 
 @dataclass(eq=False)

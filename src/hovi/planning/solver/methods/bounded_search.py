@@ -253,17 +253,6 @@ class BoundedSearch:
             self.unmet = self.unsatisfied(ended.x)
         return ended
 
-    def solve_at_level(self, path: DiscretePath, level: float) -> Bounded:
-        """Solve from a point of a central path, or one near it.
-
-        level: its barrier parameter, relative to the mean density of the objective.
-        """
-        self.at_level = True
-        try:
-            return self.solve(self.start_at(path, level, self.objective(self.multipliers), True))
-        finally:
-            self.at_level = False
-
     def start_at(
         self, path: DiscretePath, level: float, objective: BoundedAction, central: bool = False
     ) -> Begun:

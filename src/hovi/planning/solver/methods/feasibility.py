@@ -42,7 +42,12 @@ WARM_STEPS = 100
 
 def feasible_motion(search: BoundedSearch) -> tuple[Bounded, str]:
     """A motion from the guess within bounds at points and control points, or why there is none."""
-    ended = _solved_nearby(search) or _solved_at_all(search)
+    ended = _solved_nearby(search)
+    if ended is None and search.near is not None:
+        search.near = search.no_near_rows()
+        ended = cleared_motion(search, search.guess)
+    elif ended is None:
+        ended = search.solve(Start(search.guess))
     failed = ended.why is Reason.DIVERGED
     if search.near is not None and failed:
         missed = search.too_close if ended.feasible else search.worst
@@ -75,13 +80,6 @@ def _solved_nearby(search: BoundedSearch) -> Bounded | None:
         return ended
     search.multipliers, search.unmet = None, ""
     return None
-
-
-def _solved_at_all(search: BoundedSearch) -> Bounded:
-    if search.near is not None:
-        search.near = search.no_near_rows()
-        return cleared_motion(search, search.guess)
-    return search.solve(Start(search.guess))
 
 
 def _solved_along(search: BoundedSearch, along: CentralPath) -> Bounded:
@@ -188,7 +186,12 @@ def _solved_from_level(search: BoundedSearch, along: CentralPath, level: float) 
     if along.rows is None:
         search.rows.refine(path, fraction)
     search.look_around(path)
-    return search.solve_at_level(path, fraction)
+    search.at_level = True
+    try:
+        start = search.start_at(path, fraction, search.objective(search.multipliers), True)
+        return search.solve(start)
+    finally:
+        search.at_level = False
 
 
 def solved_from(search: BoundedSearch, path: DiscretePath) -> Bounded:

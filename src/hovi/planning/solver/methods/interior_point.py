@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
-
 import numpy as np
 
 from hovi.discrete.grid import DiscretePath
@@ -12,7 +10,7 @@ from hovi.optimize.ended import STOPPED, Reason
 from hovi.planning.problem.contradictions import contradiction
 from hovi.planning.problem.limits import no_limits
 from hovi.planning.problem.problem import TrajectoryProblem
-from hovi.planning.solver.answer import Answer, answered
+from hovi.planning.solver.answer import STOPS, Answer, why_stopped
 from hovi.planning.solver.methods.bounded_search import BoundedSearch
 from hovi.planning.solver.methods.feasibility import feasible_motion
 from hovi.planning.solver.methods.limits_between_points import tightened, usable
@@ -62,7 +60,10 @@ class InteriorPoint(Method):
         search = BoundedSearch(problem, limits, criteria, report, start)
         if self.free is not None:
             search.goes_on_from(self.free)
-        return answered(partial(_searched, search), partial(_ended, search))
+        try:
+            return _searched(search)
+        except STOPS as stopped:
+            return _ended(search, why_stopped(stopped))
 
 
 def _searched(search: BoundedSearch) -> Answer:
