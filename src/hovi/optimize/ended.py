@@ -46,6 +46,16 @@ class Reason(StrEnum):
 
 STOPPED = Reason.TIME_LIMIT, Reason.INTERRUPTED
 """Reasons that end the whole search."""
+STOPS = KeyboardInterrupt, OutOfTimeError
+"""What ends a solve from outside: Ctrl-C, and the end of its time."""
+
+
+def why_stopped(stopped: BaseException) -> Reason:
+    """Why a solve ended, where one of STOPS ended it; Ctrl-C is recorded."""
+    if isinstance(stopped, OutOfTimeError):
+        return Reason.TIME_LIMIT
+    record_interrupt()
+    return Reason.INTERRUPTED
 
 
 @dataclass(frozen=True)
@@ -123,12 +133,10 @@ class Ended(Generic[X, Z]):
         try:
             with Deadline(time_limit).in_force():
                 yield
-        except OutOfTimeError:
-            self.why = Reason.TIME_LIMIT
-            self.x, self.outputs = self.kept or (self.x, self.outputs)
-        except KeyboardInterrupt:
-            record_interrupt()
-            self.why = Reason.INTERRUPTED
+        except STOPS as stopped:
+            self.why = why_stopped(stopped)
+            if self.why is Reason.TIME_LIMIT:
+                self.x, self.outputs = self.kept or (self.x, self.outputs)
         except (ArithmeticError, np.linalg.LinAlgError):
             self.why = Reason.DIVERGED
 

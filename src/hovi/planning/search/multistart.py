@@ -98,7 +98,8 @@ class Pool:
         try:
             if min(self.processes, len(starts)) > 1:
                 self._in_workers(starts, results)
-            for i in (i for i in range(len(starts)) if i not in results):
+            missing = [i for i in range(len(starts)) if i not in results]
+            for i in missing:
                 if results and self.deadline.passed:
                     break
                 left = self.deadline.seconds_left

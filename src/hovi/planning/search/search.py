@@ -84,7 +84,7 @@ class Search:
             require_given_duration(self.fine.problem())
         started = time.perf_counter()
         with self.deadline.in_force():
-            best, minima = self._run() if self.without is None else self._without(self.without)
+            best, minima = self._run() if self.without is None else self._begun_at(self.without)
         return dataclasses.replace(
             best,
             minima=minima,
@@ -92,7 +92,7 @@ class Search:
             solve_seconds=time.perf_counter() - started,
         )
 
-    def _without(self, job: Job) -> tuple[Solution, tuple[float, ...]]:
+    def _begun_at(self, job: Job) -> tuple[Solution, tuple[float, ...]]:
         """The best solution, and the costs of all minima on the requested grid.
 
         Most motions keep links apart without being asked to. So where that is asked, the motion

@@ -11,7 +11,7 @@ from hovi.discrete.instants import Instants
 from hovi.discrete.interval_batch import Jet
 from hovi.discrete.output.caution import SAMPLED, Caution, with_cautions
 from hovi.discrete.trajectory import Trajectory
-from hovi.optimize.ended import Iteration, Reason
+from hovi.optimize.ended import Iteration
 from hovi.optimize.quadratic_model import QuadraticModel
 from hovi.planning.conditions.excess import undecided
 from hovi.planning.problem.problem import TrajectoryProblem
@@ -22,15 +22,10 @@ from hovi.planning.solver.status import Status
 from hovi.scene.lagrangian import PointTerms
 from hovi.system.dataclass import dataclass
 from hovi.system.deadline import OutOfTimeError
-from hovi.system.interruption import record_interrupt
 
 if TYPE_CHECKING:
     from hovi.planning.solver.central_path import CentralPath
     from hovi.planning.solver.outcome.solution_factor import SolvedBounds
-
-
-STOPS = KeyboardInterrupt, OutOfTimeError
-"""What ends a solve from outside: Ctrl-C, and the end of its time."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,14 +107,3 @@ def _undecided(problem: TrajectoryProblem, motion: Trajectory) -> list[Caution]:
     except OutOfTimeError:  # of a motion that is no success
         return []
     return [Caution(SAMPLED, each) for each in sentences if each]
-
-
-def why_stopped(stopped: BaseException) -> Reason:
-    """Why a solve ended, where one of STOPS did between its iterations; Ctrl-C is recorded.
-
-    Iterations return their current point themselves.
-    """
-    if isinstance(stopped, OutOfTimeError):
-        return Reason.TIME_LIMIT
-    record_interrupt()
-    return Reason.INTERRUPTED

@@ -24,7 +24,7 @@ from hovi.discrete.state import Periodic
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError
 from hovi.optimize.criteria import MAX_ITERATIONS, Criteria
-from hovi.optimize.ended import Iteration, Reason
+from hovi.optimize.ended import STOPS, Iteration, Reason, why_stopped
 from hovi.optimize.quadratic_model import QuadraticModel
 from hovi.optimize.start import Start
 from hovi.planning.problem.frame_goal import FrameGoal
@@ -32,7 +32,7 @@ from hovi.planning.problem.notation.ends import End
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.problem.tolerance import LAST_BARRIER, REMAINING_FRACTION, Accuracy
 from hovi.planning.problem.units import as_time_limit, seconds
-from hovi.planning.solver.answer import STOPS, Answer, why_stopped
+from hovi.planning.solver.answer import Answer
 from hovi.planning.solver.initial_path import guess_path, turned_on
 from hovi.planning.solver.limits.row_forces import at_instants
 from hovi.planning.solver.methods.choice import method_for

@@ -30,9 +30,7 @@ from hovi.planning.solver.methods.method import Guess
 from hovi.planning.solver.outcome.cost_with_time import price_of_time
 from hovi.planning.solver.solver import STATIONARY_DECREASE, Solution, solution_of
 from hovi.planning.solver.status import Status, chart_sentence, status_of
-from hovi.system.blas_threads import one_blas_thread
 from hovi.system.deadline import Deadline, OutOfTimeError
-from hovi.system.interruption import interruptible
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]
@@ -75,8 +73,6 @@ def _stays(equation: Equation, grid: Grid, nodes: Index) -> bool:
     return not inside and not (moves and equation.y.needs - {"q"})
 
 
-@one_blas_thread
-@interruptible
 def solve_jointly(
     problem: TrajectoryProblem,
     path: DiscretePath,

@@ -15,13 +15,13 @@ from hovi.discrete.grid import DiscretePath
 from hovi.optimize.barrier import Barrier
 from hovi.optimize.bordered_model import BorderedModel
 from hovi.optimize.criteria import Criteria
-from hovi.optimize.ended import STOPPED, Ended, Outputs, Reason
+from hovi.optimize.ended import STOPPED, STOPS, Ended, Outputs, Reason, why_stopped
 from hovi.optimize.interior_point import minimize_bounded
 from hovi.optimize.start import Start
 from hovi.planning.problem.limits import Limits
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.problem.time_price import TimePrice
-from hovi.planning.solver.answer import STOPS, Answer, why_stopped
+from hovi.planning.solver.answer import Answer
 from hovi.planning.solver.free_duration.timed_bounded_action import TimedBoundedAction
 from hovi.planning.solver.free_duration.timed_path import TimedPath, stretched_path
 from hovi.planning.solver.methods.bounded_search import (

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 
 from hovi.optimize.criteria import Criteria
-from hovi.optimize.ended import Reason
+from hovi.optimize.ended import STOPS, Reason, why_stopped
 from hovi.planning.clearance.clearance_violation import near_pairs
 from hovi.planning.problem.contradictions import contradiction
 from hovi.planning.problem.limits import no_limits
@@ -16,8 +16,7 @@ from hovi.planning.solver.methods.lagrange_newton import LagrangeNewton
 from hovi.planning.solver.methods.method import Guess, Method, Report
 from hovi.planning.solver.methods.trust_region import TrustRegion
 from hovi.planning.solver.status import Status, unfinished
-from hovi.system.deadline import Deadline, OutOfTimeError
-from hovi.system.interruption import record_interrupt
+from hovi.system.deadline import Deadline
 
 WITHOUT_LIMITS: tuple[Method, ...] = (TrustRegion(), LagrangeNewton())
 """Methods for problems without limits."""
@@ -58,11 +57,8 @@ class FreeFirst(Method):
         try:
             with deadline.in_force():
                 apart = found.status in SOLVED and _keeps_distances(found)
-        except KeyboardInterrupt:
-            record_interrupt()
-            return _unchecked(found, Reason.INTERRUPTED)
-        except OutOfTimeError:
-            return _unchecked(found, Reason.TIME_LIMIT)
+        except STOPS as stopped:
+            return _unchecked(found, why_stopped(stopped))
         if apart:
             return found
         left = dataclasses.replace(criteria, time_limit=deadline.seconds_left)

@@ -6,11 +6,11 @@ import numpy as np
 
 from hovi.discrete.grid import DiscretePath
 from hovi.optimize.criteria import Criteria
-from hovi.optimize.ended import STOPPED, Reason
+from hovi.optimize.ended import STOPPED, STOPS, Reason, why_stopped
 from hovi.planning.problem.contradictions import contradiction
 from hovi.planning.problem.limits import no_limits
 from hovi.planning.problem.problem import TrajectoryProblem
-from hovi.planning.solver.answer import STOPS, Answer, why_stopped
+from hovi.planning.solver.answer import Answer
 from hovi.planning.solver.methods.bounded_search import BoundedSearch
 from hovi.planning.solver.methods.feasibility import feasible_motion
 from hovi.planning.solver.methods.limits_between_points import tightened, usable
@@ -62,7 +62,7 @@ class InteriorPoint(Method):
             search.goes_on_from(self.free)
         try:
             return _searched(search)
-        except STOPS as stopped:
+        except STOPS as stopped:  # between iterations, which end with their current point
             return _ended(search, why_stopped(stopped))
 
 

@@ -10,15 +10,14 @@ import numpy.typing as npt
 from hovi.discrete.grid import DiscretePath
 from hovi.optimize.banded_model import BandModel
 from hovi.optimize.criteria import Criteria
-from hovi.optimize.ended import Reason
+from hovi.optimize.ended import STOPS, Reason, why_stopped
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.answer import Answer
 from hovi.planning.solver.methods.method import Guess, Method, Report
 from hovi.planning.solver.outcome.cost_with_time import cost_of
 from hovi.planning.solver.status import Status, chart_sentence, unfinished
-from hovi.system.deadline import Deadline, OutOfTimeError, raise_if_late
-from hovi.system.interruption import record_interrupt
+from hovi.system.deadline import Deadline, raise_if_late
 
 if TYPE_CHECKING:
     from scipy.sparse import csc_matrix
@@ -98,11 +97,8 @@ class _Search:
                     return why
                 if report is not None:
                     report(self.steps, self.objective.problem.ld.action(self.x))
-        except KeyboardInterrupt:
-            record_interrupt()
-            return Reason.INTERRUPTED
-        except OutOfTimeError:
-            return Reason.TIME_LIMIT
+        except STOPS as stopped:
+            return why_stopped(stopped)
         return Reason.ITERATION_LIMIT
 
     def _step(self) -> Reason | None:

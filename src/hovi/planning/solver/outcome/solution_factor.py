@@ -168,10 +168,8 @@ class SolutionFactor:
         and NaN where the motion has no freedom to follow.
         """
         free = self.problem.free_ends[self._number(end)]
-        curvature, hessian = (
-            np.zeros((*free.shape, *free.shape)),
-            self.system.plain.intervals.hessian,
-        )
+        curvature = np.zeros((*free.shape, *free.shape))
+        hessian = self.system.plain.intervals.hessian
         for j, i in np.argwhere(~free):
             columns, z = self._moved_columns(end, j, i)
             force = np.einsum("kcdab,kdb->kca", hessian, columns) + self.system.pulled_columns(z)
