@@ -4,6 +4,12 @@ from . import accuracy as accuracy
 from . import effects as effects
 from . import schemes as schemes
 from . import symbolic as symbolic
+from .conditions.condition import Condition as Condition
+from .conditions.function import Function as Function
+from .conditions.function import Points as Points
+from .conditions.places import AtTimes as AtTimes
+from .conditions.sets import Between as Between
+from .conditions.sets import Equal as Equal
 from .discrete.discrete_lagrangian import DiscreteLagrangian as DiscreteLagrangian
 from .discrete.grid import DiscretePath as DiscretePath
 from .discrete.grid import Grid as Grid
@@ -43,12 +49,6 @@ from .flows.symmetry import Symmetry as Symmetry
 from .flows.symmetry import base_rotation as base_rotation
 from .flows.symmetry import base_translation as base_translation
 from .planning.clearance.clearance import Clearance as Clearance
-from .planning.conditions.condition import Condition as Condition
-from .planning.conditions.function import Function as Function
-from .planning.conditions.function import Points as Points
-from .planning.conditions.places import AtTimes as AtTimes
-from .planning.conditions.sets import Between as Between
-from .planning.conditions.sets import Equal as Equal
 from .planning.obstacles.grasped import Grasped as Grasped
 from .planning.obstacles.grasped import holding as holding
 from .planning.obstacles.mesh import ConvexParts as ConvexParts

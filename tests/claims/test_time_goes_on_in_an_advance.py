@@ -16,9 +16,9 @@ import pinocchio as pin
 import pytest
 
 import hovi
+from hovi.conditions.condition import with_function
+from hovi.conditions.narrow import features_of
 from hovi.discrete.cells import CHANGE
-from hovi.planning.conditions.condition import with_function
-from hovi.planning.conditions.narrow import features_of
 from samples.asked_features import AskedFeatures, planned_with
 from samples.feature_judge import distances, judged
 

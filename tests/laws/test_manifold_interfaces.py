@@ -14,6 +14,8 @@ from typer.testing import CliRunner
 from hovi import Solution, certify, plan, solve
 from hovi.cli.application import application
 from hovi.cli.reports.peaks import peaks
+from hovi.conditions.function import linear
+from hovi.conditions.state_difference import StateDifference
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import DiscretePath, Grid
 from hovi.discrete.guess import regularized, with_ends_of_nodes
@@ -21,8 +23,6 @@ from hovi.discrete.state import State
 from hovi.discrete.trajectory import Trajectory
 from hovi.effects import Armature, Gravity
 from hovi.errors import ChartError, InputError, SceneError
-from hovi.planning.conditions.function import linear
-from hovi.planning.conditions.state_difference import StateDifference
 from hovi.planning.problem.limit_conditions import closeness
 from hovi.planning.problem.limits import as_limits
 from hovi.planning.problem.problem import TrajectoryProblem

@@ -21,7 +21,7 @@ FLOORS = [
     {"effects"},
     {"scene"},
     {"discrete"},
-    {"flows"},
+    {"conditions", "flows"},
     {"planning", "symbolic"},
     {"viewing"},
     {"accuracy", "exchange", "study"},
@@ -37,7 +37,6 @@ INSIDE = {
     "planning": [
         {"obstacles"},
         {"clearance"},
-        {"conditions"},
         {"problem"},
         {"paths"},
         {"solver"},

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 import hovi
+from hovi.conditions.function import Function, Points
+from hovi.conditions.joint_quantity import DERIVATIVES, QUANTITIES, JointQuantity
+from hovi.conditions.state_difference import StateDifference
 from hovi.planning.clearance.distances import distances_between
-from hovi.planning.conditions.function import Function, Points
-from hovi.planning.conditions.joint_quantity import DERIVATIVES, QUANTITIES, JointQuantity
-from hovi.planning.conditions.pair_distances import PairDistances
-from hovi.planning.conditions.state_difference import StateDifference
 from hovi.planning.problem.conditions_of import conditions_of, ends_of
+from hovi.planning.problem.pair_distances import PairDistances
 from hovi.schemes import galerkin
 
 STEP = 1e-6

@@ -7,9 +7,9 @@ import pinocchio as pin
 import pytest
 
 import hovi
+from hovi.conditions.function import Function, at_state, linear
+from hovi.conditions.state_difference import StateDifference
 from hovi.errors import InputError
-from hovi.planning.conditions.function import Function, at_state, linear
-from hovi.planning.conditions.state_difference import StateDifference
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.inverse_kinematics import nearest_configuration
 from hovi.robot.robot import Robot

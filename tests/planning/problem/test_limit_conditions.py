@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from hovi import plan
+from hovi.conditions.excess import excess_along, excess_of, worst
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import Grid
 from hovi.discrete.path_on_grid import path_on_grid
 from hovi.discrete.state import State
 from hovi.discrete.trajectory import Trajectory
-from hovi.planning.conditions.excess import excess_along, excess_of, worst
 from hovi.planning.problem.limit_conditions import (
     closeness,
     closeness_by_interval,

@@ -8,8 +8,8 @@ import numpy.typing as npt
 import pytest
 
 import hovi
+from hovi.conditions.function import Curvature, Points, Slopes
 from hovi.discrete.grid import DiscretePath, Grid
-from hovi.planning.conditions.function import Curvature, Points, Slopes
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.constrained_action import ConstrainedAction
 from hovi.robot.loading import load_robot

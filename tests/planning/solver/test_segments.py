@@ -15,9 +15,9 @@ import pytest
 from scipy.integrate import solve_bvp
 
 import hovi
+from hovi.conditions.excess import excess_along
 from hovi.discrete.state import State
 from hovi.errors import InputError
-from hovi.planning.conditions.excess import excess_along
 from hovi.planning.problem.limit_conditions import LimitRange, closeness, limit_conditions
 from hovi.planning.problem.limits import Limits, as_limits
 from hovi.planning.problem.presolve.end_torques import static_sentence

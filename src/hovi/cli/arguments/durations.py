@@ -7,7 +7,7 @@ from hovi.errors import InputError
 
 def positive_seconds(flag: str, text: str) -> float:
     """The value of a flag in [s], from a number or a text such as "2 min". Raises InputError."""
-    from hovi.planning.problem.units import seconds
+    from hovi.checks.units import seconds
 
     try:
         number = float(text)

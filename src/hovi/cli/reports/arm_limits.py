@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from hovi.planning.conditions.joint_quantity import QUANTITIES
+from hovi.conditions.joint_quantity import QUANTITIES
 from hovi.planning.problem.arms.limit_set import LimitSet, is_limit_set, limit_set
 from hovi.planning.task_file.task import Task
 

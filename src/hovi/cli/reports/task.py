@@ -48,8 +48,8 @@ def describe_task(task: Task) -> str:
 
 def _segments(task: Task) -> list[str]:
     """The segments: when they end, where, and what is theirs alone."""
+    from hovi.checks.units import in_words
     from hovi.planning.problem.notation.ends import as_end
-    from hovi.planning.problem.units import in_words
     from hovi.planning.sequence.segment import duration_of_segment, names_of
 
     robot, lines, end = task.scene.robot, [], 0.0
@@ -72,7 +72,7 @@ def _segments(task: Task) -> list[str]:
 
 def _duration(task: Task) -> str:
     """The duration, with its weight if it is free."""
-    from hovi.planning.problem.units import in_words
+    from hovi.checks.units import in_words
 
     priced = isinstance(task.duration, tuple)
     weight = f", {task.options.time_weight:g} per second" if priced else ""

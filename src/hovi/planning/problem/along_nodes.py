@@ -13,18 +13,18 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from hovi.discrete.grid import Grid
-from hovi.planning.conditions.condition import (
+from hovi.conditions.condition import (
     TOLERANCE,
     Condition,
     Equation,
     EquationAlong,
     linear_at,
 )
-from hovi.planning.conditions.excess import in_words
-from hovi.planning.conditions.function import Curvature, Function, Points, Slopes, at_state
-from hovi.planning.conditions.places import AtNode
-from hovi.planning.conditions.sets import Equal
+from hovi.conditions.excess import in_words
+from hovi.conditions.function import Curvature, Function, Points, Slopes, at_state
+from hovi.conditions.places import AtNode
+from hovi.conditions.sets import Equal
+from hovi.discrete.grid import Grid
 from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from hovi.planning.conditions.condition import Condition, Equation
-from hovi.planning.conditions.joint_quantity import DERIVATIVES, JointQuantity
-from hovi.planning.conditions.pair_distances import PairDistances
-from hovi.planning.conditions.places import Along, AtNode, Exchange
-from hovi.planning.conditions.sets import Between, Equal
-from hovi.planning.conditions.state_difference import StateDifference
+from hovi.conditions.condition import Condition, Equation
+from hovi.conditions.joint_quantity import DERIVATIVES, JointQuantity
+from hovi.conditions.places import Along, AtNode, Exchange
+from hovi.conditions.sets import Between, Equal
+from hovi.conditions.state_difference import StateDifference
 from hovi.planning.problem.limit_conditions import limit_conditions
+from hovi.planning.problem.pair_distances import PairDistances
 from hovi.planning.problem.problem import TrajectoryProblem
 
 

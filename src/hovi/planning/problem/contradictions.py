@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from hovi.conditions.state_difference import StateDifference
 from hovi.discrete.state import Periodic
 from hovi.planning.clearance.clearance_violation import less_than_margin
-from hovi.planning.conditions.state_difference import StateDifference
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.goal_clearance import goal_in_obstacle
 from hovi.planning.problem.limits import Limits

@@ -17,12 +17,12 @@ import pinocchio as pin
 from hovi.checks.arguments import check_arguments
 from hovi.checks.directions import unit_vector
 from hovi.checks.shapes import numbers_of
+from hovi.conditions.function import Curvature, Function, Points, Slopes
 from hovi.dynamics.point_function import PointFunction
 from hovi.dynamics.symbolic_dynamics import casadi_functions
 from hovi.errors import InputError, nearest, warn
-from hovi.planning.conditions.function import Curvature, Function, Points, Slopes
-from hovi.planning.problem.kinematics.orientation import ORIENTATIONS, rotation_from
 from hovi.robot.robot import Robot
+from hovi.robot.space.orientation import ORIENTATIONS, rotation_from
 from hovi.robot.space.tangent import Symbols, hessian, jacobian
 from hovi.system.dataclass import dataclass
 

@@ -11,10 +11,11 @@ import numpy.typing as npt
 
 from hovi.checks.arguments import check_arguments_except
 from hovi.checks.shapes import numbers_of
+from hovi.checks.units import seconds
+from hovi.conditions.function import Function, linear
+from hovi.conditions.state_difference import StateDifference
 from hovi.discrete.state import ALL, State
 from hovi.errors import InputError
-from hovi.planning.conditions.function import Function, linear
-from hovi.planning.conditions.state_difference import StateDifference
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.inverse_kinematics import (
     InverseKinematicsResult,
@@ -22,7 +23,6 @@ from hovi.planning.problem.inverse_kinematics import (
 )
 from hovi.planning.problem.limits import Limits
 from hovi.planning.problem.presolve.frame_hints import hint_on_frame
-from hovi.planning.problem.units import seconds
 from hovi.robot.robot import Robot
 from hovi.robot.space.coordinates import Coordinates
 from hovi.robot.tip_frame import moves_frame

@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from hovi.conditions.condition import TOLERANCE, Condition
+from hovi.conditions.excess import excess_along
+from hovi.conditions.joint_quantity import DERIVATIVES, JointQuantity
+from hovi.conditions.places import AtPoints, ControlPoints
+from hovi.conditions.sets import TwoSided
 from hovi.discrete.trajectory import Sample, Trajectory
-from hovi.planning.conditions.condition import TOLERANCE, Condition
-from hovi.planning.conditions.excess import excess_along
-from hovi.planning.conditions.joint_quantity import DERIVATIVES, JointQuantity
-from hovi.planning.conditions.places import AtPoints, ControlPoints
-from hovi.planning.conditions.sets import TwoSided
 from hovi.planning.problem.limits import Limits
 from hovi.robot.robot import Robot
 from hovi.robot.space.configuration_space import ConfigurationSpace

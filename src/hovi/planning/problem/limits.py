@@ -13,11 +13,11 @@ import numpy.typing as npt
 from hovi.checks.arguments import check_arguments, check_arguments_except
 from hovi.checks.kinds import shown
 from hovi.checks.shapes import require_shape
+from hovi.conditions.condition import Inequality, scales, with_function
+from hovi.conditions.joint_quantity import QUANTITIES
+from hovi.conditions.named import NAMED
+from hovi.conditions.sets import Between
 from hovi.errors import InputError, nearest, warn
-from hovi.planning.conditions.condition import Inequality, scales, with_function
-from hovi.planning.conditions.joint_quantity import QUANTITIES
-from hovi.planning.conditions.named import NAMED
-from hovi.planning.conditions.sets import Between
 from hovi.planning.problem.arms.limit_set import NAMES as ARMS
 from hovi.planning.problem.arms.limit_set import OF_ORDER_3, is_limit_set, limit_set
 from hovi.planning.problem.arms.urdf_ranges import position_ranges, require_ranges

@@ -13,6 +13,21 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.checks.arguments import check_arguments
+from hovi.conditions.asked import (
+    along_of,
+    asked_at_nodes,
+    bounded_of,
+    checked,
+    require_ranges,
+)
+from hovi.conditions.condition import (
+    Condition,
+    Equation,
+    EquationAlong,
+    Inequality,
+    equation,
+)
+from hovi.conditions.state_difference import StateDifference
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import DiscretePath, Grid
 from hovi.discrete.guess import Curve, Ends, named_curve
@@ -24,21 +39,6 @@ from hovi.errors import InputError, warn
 from hovi.planning.clearance.clearance import Clearance
 from hovi.planning.clearance.distances import Distances
 from hovi.planning.clearance.within_reach import distances_within_reach, with_gaps
-from hovi.planning.conditions.asked import (
-    along_of,
-    asked_at_nodes,
-    bounded_of,
-    checked,
-    require_ranges,
-)
-from hovi.planning.conditions.condition import (
-    Condition,
-    Equation,
-    EquationAlong,
-    Inequality,
-    equation,
-)
-from hovi.planning.conditions.state_difference import StateDifference
 from hovi.planning.problem.along_nodes import NodeState, equations_at_nodes, sizes_of
 from hovi.planning.problem.clock import SAME_LENGTH, Clock, Lengths
 from hovi.planning.problem.conserved_momentum import Stop, kept_in_free_fall

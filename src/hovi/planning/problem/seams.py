@@ -8,11 +8,11 @@ from typing import ClassVar, Self
 import numpy as np
 import numpy.typing as npt
 
+from hovi.conditions.condition import Equation, equation
 from hovi.discrete.grid import DiscretePath, Grid
 from hovi.discrete.guess import Curve, Ends, joined, named_curve, with_ends_of_nodes
 from hovi.discrete.interval_paths import path_of_order, regularized_nodes
 from hovi.discrete.state import State
-from hovi.planning.conditions.condition import Equation, equation
 from hovi.planning.problem.goals import Via, goal_state, via_differences
 from hovi.planning.problem.limits import Limits
 from hovi.planning.problem.notation.goal_turns import keeping_turns, turns_to

@@ -13,9 +13,9 @@ import numpy as np
 
 from hovi.checks.arguments import check_arguments_except
 from hovi.checks.kinds import is_number, shown
+from hovi.checks.units import ANGLES, FRACTIONS, LENGTHS, number_and_unit
 from hovi.discrete.measures.motion_error import MotionError
 from hovi.errors import InputError, nearest
-from hovi.planning.problem.units import ANGLES, FRACTIONS, LENGTHS, number_and_unit
 from hovi.robot.robot import Robot
 from hovi.robot.tip_frame import names_in_words
 from hovi.system.dataclass import dataclass

@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from hovi.conditions.missed_along import missed_along
 from hovi.discrete.measures.motion_error import sample_points
 from hovi.discrete.trajectory import Trajectory
-from hovi.planning.conditions.missed_along import missed_along
 from hovi.planning.problem.problem import TrajectoryProblem
 
 Array = npt.NDArray[np.float64]

@@ -10,12 +10,12 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.checks.arguments import check_arguments_except
+from hovi.conditions.excess import excess_of
 from hovi.discrete.curve_integral import CurveIntegral, integral_along
 from hovi.discrete.measures.motion_error import MotionError, relative_difference
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError, expect
 from hovi.flows.execution.dynamics_replay import DynamicsReplay, replay_dynamics
-from hovi.planning.conditions.excess import excess_of
 from hovi.planning.problem.limit_conditions import closeness
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.refinement.error_estimate import estimate_error

@@ -11,13 +11,13 @@ from typing import Any, Self
 import numpy as np
 import numpy.typing as npt
 
+from hovi.conditions.asked import times_of
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import Grid
 from hovi.discrete.state import State
 from hovi.discrete.trajectory import Trajectory
 from hovi.effects import Effect
 from hovi.errors import ChartError
-from hovi.planning.conditions.asked import times_of
 from hovi.planning.problem.clock import Clock, Lengths
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.goals import Via, held_goal, is_isolated

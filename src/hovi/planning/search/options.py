@@ -10,13 +10,14 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy.typing as npt
 
 from hovi.checks.arguments import check_arguments_except
+from hovi.checks.units import as_time_limit
+from hovi.conditions.asked import as_conditions
+from hovi.conditions.condition import Condition
 from hovi.discrete.guess import require_guess
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError, expect, nearest
 from hovi.optimize.criteria import MAX_ITERATIONS
 from hovi.planning.clearance.clearance import DEFAULT_MARGIN, Clearance
-from hovi.planning.conditions.asked import as_conditions
-from hovi.planning.conditions.condition import Condition
 from hovi.planning.obstacles.obstacle import Obstacle
 from hovi.planning.obstacles.preparation import prepared_within
 from hovi.planning.problem.goals import Via
@@ -24,7 +25,6 @@ from hovi.planning.problem.limits import Limits, as_limits
 from hovi.planning.problem.notation.objective import IN_WORDS, require_objective, with_objective
 from hovi.planning.problem.notation.via_points import as_via
 from hovi.planning.problem.tolerance import Tolerance
-from hovi.planning.problem.units import as_time_limit
 from hovi.planning.search.option_fields import (
     SceneKey,
     check_numbers,

@@ -11,6 +11,7 @@ from typing import Any, ParamSpec, Protocol, cast
 import numpy as np
 
 from hovi.checks.arguments import check_arguments_except
+from hovi.checks.units import Duration, as_duration
 from hovi.discrete.output.caution import COLLISION, LEFT_OUT, STATUS, WARNED, Caution
 from hovi.discrete.state import State, warn_of_degrees
 from hovi.discrete.trajectory import Trajectory
@@ -27,7 +28,6 @@ from hovi.planning.problem.notation.smoothing import smoothed
 from hovi.planning.problem.presolve.assumptions import assumptions
 from hovi.planning.problem.presolve.findings import findings
 from hovi.planning.problem.presolve.length_slips import grasped_slips
-from hovi.planning.problem.units import Duration, as_duration
 from hovi.planning.refinement.faults.cautions import keeping_warnings, with_cautions_of_motion
 from hovi.planning.refinement.resolution import with_check
 from hovi.planning.search.branch_choice import Ends, chosen_ends, nearest_ends

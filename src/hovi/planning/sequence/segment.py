@@ -15,6 +15,7 @@ from hovi.checks.kinds import is_number, shown
 from hovi.checks.names import require_name
 from hovi.checks.shapes import numbers_of
 from hovi.checks.tables import entries_of
+from hovi.checks.units import DURATION_IN_WORDS, Duration, as_duration, seconds
 from hovi.discrete.state import State
 from hovi.effects import Effect
 from hovi.effects.registration import as_effects
@@ -22,7 +23,6 @@ from hovi.errors import InputError
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.limits import Limits
 from hovi.planning.problem.notation.ends import End, as_end
-from hovi.planning.problem.units import DURATION_IN_WORDS, Duration, as_duration, seconds
 from hovi.planning.search.job import stops_of
 from hovi.planning.search.options import PlanOptions
 from hovi.robot.robot import Robot

@@ -16,11 +16,11 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.checks.arguments import without_checks
+from hovi.conditions.condition import EquationAlong
+from hovi.conditions.function import Points
 from hovi.discrete.contraction import Expansion
 from hovi.discrete.interval_batch import Jet
 from hovi.optimize.kkt_model import ConstraintRows
-from hovi.planning.conditions.condition import EquationAlong
-from hovi.planning.conditions.function import Points
 from hovi.planning.problem.interval_moments import IntervalMoments
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.condition_outputs import add_curvature, jet_slopes

@@ -6,6 +6,7 @@ import dataclasses
 from dataclasses import field
 from typing import TYPE_CHECKING, Any
 
+from hovi.conditions.excess import undecided
 from hovi.discrete.grid import DiscretePath
 from hovi.discrete.instants import Instants
 from hovi.discrete.interval_batch import Jet
@@ -13,7 +14,6 @@ from hovi.discrete.output.caution import SAMPLED, Caution, with_cautions
 from hovi.discrete.trajectory import Trajectory
 from hovi.optimize.ended import Iteration
 from hovi.optimize.quadratic_model import QuadraticModel
-from hovi.planning.conditions.excess import undecided
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.limits.row_forces import at_instants
 from hovi.planning.solver.nodal_momenta import accumulated_momenta

@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi._native import intervals as native
+from hovi.conditions.function import Points
 from hovi.discrete.contraction import Expansion
 from hovi.discrete.discrete_lagrangian import Batch
 from hovi.discrete.grid import DiscretePath
@@ -22,7 +23,6 @@ from hovi.optimize.barrier import Bounds
 from hovi.optimize.bounded_objective import BoundedObjective, Refinement
 from hovi.optimize.ended import Outputs
 from hovi.optimize.quadratic_model import QuadraticModel
-from hovi.planning.conditions.function import Points
 from hovi.planning.problem.limits import Limits, limited_columns
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.action_objective import ActionObjective, LinearAlgebra

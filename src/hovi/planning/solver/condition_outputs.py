@@ -12,11 +12,11 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from hovi.conditions.asked import need_torques
+from hovi.conditions.condition import scales
+from hovi.conditions.excess import excess_of, worst
+from hovi.conditions.function import Curvature, Points, Slopes
 from hovi.discrete.trajectory import Trajectory
-from hovi.planning.conditions.asked import need_torques
-from hovi.planning.conditions.condition import scales
-from hovi.planning.conditions.excess import excess_of, worst
-from hovi.planning.conditions.function import Curvature, Points, Slopes
 from hovi.planning.problem.problem import TrajectoryProblem
 
 Array = npt.NDArray[np.float64]

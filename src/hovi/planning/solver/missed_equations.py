@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from hovi.conditions.condition import describe, is_spurious, residual, whose
+from hovi.conditions.missed_along import worst_along
 from hovi.discrete.grid import DiscretePath
-from hovi.planning.conditions.condition import describe, is_spurious, residual, whose
-from hovi.planning.conditions.missed_along import worst_along
 from hovi.planning.problem.conditions_of import passive_joints
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.action_objective import ActionObjective

@@ -10,10 +10,10 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.checks.arguments import without_checks
+from hovi.conditions.condition import Equation
+from hovi.conditions.function import STATE, Points
 from hovi.discrete.grid import DiscretePath, Grid
 from hovi.optimize.kkt_model import ConstraintRows
-from hovi.planning.conditions.condition import Equation
-from hovi.planning.conditions.function import STATE, Points
 from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from hovi.conditions.function import Points
 from hovi.discrete.grid import DiscretePath
-from hovi.planning.conditions.function import Points
 from hovi.planning.problem.problem import TrajectoryProblem
 
 Array = npt.NDArray[np.float64]

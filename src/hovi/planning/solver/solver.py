@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.checks.arguments import check_arguments, without_checks
+from hovi.checks.units import as_time_limit, seconds
 from hovi.discrete.grid import DiscretePath, Grid
 from hovi.discrete.instants import Instants
 from hovi.discrete.measures.motion_effort import effort_of
@@ -31,7 +32,6 @@ from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.notation.ends import End
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.problem.tolerance import LAST_BARRIER, REMAINING_FRACTION, Accuracy
-from hovi.planning.problem.units import as_time_limit, seconds
 from hovi.planning.solver.answer import Answer
 from hovi.planning.solver.initial_path import guess_path, turned_on
 from hovi.planning.solver.limits.row_forces import at_instants

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pinocchio as pin
 
+from hovi.checks.units import seconds
 from hovi.discrete.grid import outside_motion
 from hovi.discrete.state import State
 from hovi.errors import HoviError, InputError
@@ -16,7 +17,6 @@ from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.goals import Via
 from hovi.planning.problem.notation.ends import END_KEYS, EndError, end_of
 from hovi.planning.problem.notation.via_points import require_no_rates
-from hovi.planning.problem.units import seconds
 from hovi.planning.search.group import with_others
 from hovi.planning.task_file.messages import Keys, TomlText, spelled
 from hovi.planning.task_file.schema import EndTable, ViaTable

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
+from hovi.conditions.named import NAMED
 from hovi.errors import InputError, nearest
-from hovi.planning.conditions.named import NAMED
 from hovi.planning.problem.limits import KINDS, NAMES, Limits, as_limits, pairs_of
 from hovi.planning.task_file.effect_tables import plain
 from hovi.planning.task_file.messages import Keys, TomlText, first_sentence, in_toml, spelled

@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING, Any
 from pydantic import ValidationError
 
 from hovi.checks.arguments import check_arguments
+from hovi.checks.units import as_duration
 from hovi.errors import HoviError, InputError, SceneError, SchemeError
 from hovi.planning.obstacles.obstacle import Obstacle
 from hovi.planning.obstacles.preparation import prepared_within
 from hovi.planning.problem.tolerance import Tolerance
-from hovi.planning.problem.units import as_duration
 from hovi.planning.search.options import INTERVALS_TWICE, TOLERANCE_AND_SCHEME, PlanOptions
 from hovi.planning.sequence.segment import duration_of
 from hovi.planning.task_file.effect_tables import read_effects

@@ -19,9 +19,9 @@ from pydantic import (
     create_model,
 )
 
+from hovi.checks.units import DURATION_IN_WORDS, SECONDS_IN_WORDS
 from hovi.planning.obstacles.obstacle import GRASPED_KEYS
 from hovi.planning.problem.arms.limit_set import LimitSetName
-from hovi.planning.problem.units import DURATION_IN_WORDS, SECONDS_IN_WORDS
 from hovi.planning.search.option_fields import SceneKey, option_infos
 from hovi.planning.search.options import MAX_INTERVALS, PlanOptions
 

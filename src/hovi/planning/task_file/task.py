@@ -8,11 +8,11 @@ from dataclasses import field
 from typing import Any, Self
 
 from hovi.checks.arguments import check_arguments_except
+from hovi.checks.units import as_duration, in_words
 from hovi.discrete.state import State
 from hovi.errors import InputError, warn
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.notation.ends import as_end
-from hovi.planning.problem.units import as_duration, in_words
 from hovi.planning.search.option_fields import option_infos
 from hovi.planning.search.options import PlanOptions
 from hovi.planning.sequence.segment import (

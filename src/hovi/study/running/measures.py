@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from hovi.conditions.excess import excess_along
 from hovi.discrete.output.caution import caution_lines
 from hovi.discrete.trajectory import Trajectory
-from hovi.planning.conditions.excess import excess_along
 from hovi.planning.problem.limit_conditions import closeness
 from hovi.planning.solver.outcome.margins import margins_to_obstacles
 from hovi.planning.solver.solver import Solution

@@ -18,6 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.checks.arguments import check_arguments_except
+from hovi.conditions.excess import excess_along
 from hovi.discrete.measures.motion_effort import effort_of
 from hovi.discrete.measures.motion_extremes import extremes
 from hovi.discrete.output.caution import caution_lines
@@ -25,7 +26,6 @@ from hovi.discrete.trajectory import Trajectory
 from hovi.errors import DisplayError, HoviError
 from hovi.flows.execution.dynamics_replay import DynamicsReplay, replay_dynamics
 from hovi.planning.clearance.clearance_violation import closest_along
-from hovi.planning.conditions.excess import excess_along
 from hovi.planning.problem.limit_conditions import closeness
 from hovi.planning.problem.limits import KINDS
 from hovi.scene.scene import Scene

@@ -13,8 +13,8 @@ import pinocchio as pin
 import pytest
 
 import hovi
+from hovi.conditions.joint_quantity import QUANTITIES
 from hovi.errors import InputError
-from hovi.planning.conditions.joint_quantity import QUANTITIES
 from hovi.planning.problem.arms import limit_set as module
 from hovi.planning.problem.arms.limit_set import NAMES, LimitSet, limit_set
 from hovi.planning.problem.limits import KINDS, as_limits, urdf_limits

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import hovi
-from hovi.planning.conditions.function import Points
+from hovi.conditions.function import Points
 from hovi.planning.problem.frame_goal import PoseDifference
 from hovi.planning.problem.kinematics.damped_newton import candidates, seeds
 from hovi.robot.robot import Robot

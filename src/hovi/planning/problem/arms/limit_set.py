@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any, Literal, get_args
 
 from hovi.checks.arguments import check_arguments
+from hovi.conditions.joint_quantity import QUANTITIES
 from hovi.errors import InputError, nearest
-from hovi.planning.conditions.joint_quantity import QUANTITIES
 from hovi.robot.robot import Robot
 from hovi.robot.space.coordinates import Coordinates
 from hovi.system.dataclass import dataclass

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 import numpy as np
 import numpy.typing as npt
 
-from hovi.planning.conditions.function import linear
+from hovi.conditions.function import linear
 from hovi.planning.problem.frame_goal import FrameGoal, PoseDifference
 from hovi.robot.robot import Robot
 from hovi.system.deadline import raise_if_late

@@ -10,10 +10,10 @@ import numpy.typing as npt
 from hovi.discrete.state import State, as_state
 from hovi.errors import InputError, nearest
 from hovi.planning.problem.frame_goal import FrameGoal
-from hovi.planning.problem.kinematics.orientation import ORIENTATIONS
 from hovi.planning.problem.notation.other_planners import refuse_pose
 from hovi.robot.robot import Robot
 from hovi.robot.space.coordinates import Coordinates
+from hovi.robot.space.orientation import ORIENTATIONS
 
 End = State | FrameGoal | npt.ArrayLike | str | Mapping[str, Any]
 """A start or a goal as it may be given."""

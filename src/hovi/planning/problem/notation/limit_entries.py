@@ -10,8 +10,8 @@ import numpy.typing as npt
 
 from hovi.checks.kinds import is_number, shown
 from hovi.checks.shapes import numbers_of
+from hovi.checks.units import number_and_unit
 from hovi.errors import InputError
-from hovi.planning.problem.units import number_and_unit
 from hovi.robot.space.coordinates import Coordinates
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from hovi.planning.conditions.joint_quantity import QUANTITIES
+from hovi.conditions.joint_quantity import QUANTITIES
 from hovi.system.summary import Summarized, Summary
 
 Array = npt.NDArray[np.float64]

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from hovi.conditions.asked import as_conditions, need_torques
+from hovi.conditions.condition import Equation
+from hovi.conditions.places import Along
 from hovi.discrete.state import Periodic
 from hovi.errors import InputError
-from hovi.planning.conditions.asked import as_conditions, need_torques
-from hovi.planning.conditions.condition import Equation
-from hovi.planning.conditions.places import Along
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.notation.summaries import ProblemSummary
 from hovi.scene.scene import require_plannable

@@ -6,10 +6,10 @@ from collections.abc import Mapping
 from typing import Any
 
 from hovi.checks.kinds import shown
+from hovi.checks.units import SECONDS_IN_WORDS
 from hovi.errors import InputError
 from hovi.planning.problem.goals import Via
 from hovi.planning.problem.notation.ends import EndError, end_of
-from hovi.planning.problem.units import SECONDS_IN_WORDS
 
 
 def as_via(given: Any, number: int) -> Via:

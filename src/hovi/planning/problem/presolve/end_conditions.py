@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from hovi.planning.conditions.condition import Inequality, scales
-from hovi.planning.conditions.excess import in_words
-from hovi.planning.conditions.expression import Expression
-from hovi.planning.conditions.function import Points
+from hovi.conditions.condition import Inequality, scales
+from hovi.conditions.excess import in_words
+from hovi.conditions.expression import Expression
+from hovi.conditions.function import Points
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.robot.space.coordinates import Coordinates
 

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from hovi.conditions.joint_quantity import QUANTITIES
 from hovi.errors import InputError
-from hovi.planning.conditions.joint_quantity import QUANTITIES
 from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]

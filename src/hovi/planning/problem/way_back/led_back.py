@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from hovi.planning.conditions.joint_quantity import QUANTITIES
+from hovi.conditions.joint_quantity import QUANTITIES
 from hovi.planning.problem.limits import KINDS
 from hovi.planning.problem.way_back.end_state import SHORTEST, STRIDE, EndState, Over
 from hovi.planning.problem.way_back.excused import Excused

@@ -9,6 +9,7 @@ from typing import ParamSpec
 
 import numpy as np
 
+from hovi.conditions.joint_quantity import QUANTITIES
 from hovi.discrete.output.caution import (
     COARSE,
     LIMITS,
@@ -18,7 +19,6 @@ from hovi.discrete.output.caution import (
     with_cautions,
 )
 from hovi.errors import HoviError, recorded_warnings
-from hovi.planning.conditions.joint_quantity import QUANTITIES
 from hovi.planning.problem.limit_conditions import closeness
 from hovi.planning.problem.limits import KINDS, urdf_limits
 from hovi.planning.problem.problem import TrajectoryProblem

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from hovi.conditions.missed_along import worst_along
 from hovi.discrete.curve_integral import integral_along
 from hovi.discrete.trajectory import Trajectory
-from hovi.planning.conditions.missed_along import worst_along
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.refinement.between_nodes import NEGLIGIBLE_FRACTION, passive_torque
 from hovi.planning.solver.outcome.cost_with_time import cost_of, price_of_time

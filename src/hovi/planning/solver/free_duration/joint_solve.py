@@ -8,12 +8,12 @@ import time
 import numpy as np
 import numpy.typing as npt
 
+from hovi.conditions.condition import Equation
 from hovi.discrete.grid import DiscretePath, Grid
 from hovi.optimize.criteria import MAX_ITERATIONS, Criteria
 from hovi.optimize.ended import Ended, Reason
 from hovi.optimize.start import Start
 from hovi.optimize.trust_region import minimize
-from hovi.planning.conditions.condition import Equation
 from hovi.planning.problem.clock import SAME_LENGTH, Clock
 from hovi.planning.problem.contradictions import contradiction
 from hovi.planning.problem.limits import Limits, no_limits

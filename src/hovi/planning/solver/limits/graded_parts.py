@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from hovi.conditions.joint_quantity import DERIVATIVES
 from hovi.discrete.grid import Grid
-from hovi.planning.conditions.joint_quantity import DERIVATIVES
 from hovi.planning.problem.limits import Limits
 from hovi.planning.problem.way_back.excused import ROUNDING
 from hovi.planning.solver.limits.limited_coordinates import LimitedCoordinates

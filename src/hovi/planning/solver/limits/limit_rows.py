@@ -18,12 +18,12 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi._native import intervals as native
+from hovi.conditions.joint_quantity import DERIVATIVES
 from hovi.discrete.grid import DiscretePath, Grid
 from hovi.discrete.instants import Instants
 from hovi.discrete.interval_batch import Coordinates
 from hovi.discrete.interval_paths import scaled_data
 from hovi.optimize.bounded_objective import Refinement
-from hovi.planning.conditions.joint_quantity import DERIVATIVES
 from hovi.planning.problem.limits import Limits
 from hovi.planning.problem.way_back.excused import Excused
 from hovi.planning.solver.limits.graded_parts import graded

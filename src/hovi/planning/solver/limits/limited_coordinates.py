@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from hovi.conditions.joint_quantity import DERIVATIVES
 from hovi.discrete.grid import Grid
-from hovi.planning.conditions.joint_quantity import DERIVATIVES
 from hovi.planning.problem.limit_conditions import polynomials
 from hovi.planning.problem.limits import Limits
 from hovi.robot.space.configuration_space import ConfigurationSpace

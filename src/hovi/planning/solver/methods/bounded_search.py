@@ -8,6 +8,8 @@ from typing import ClassVar
 import numpy as np
 import numpy.typing as npt
 
+from hovi.conditions.excess import excess_of, worst
+from hovi.conditions.places import AtPoints
 from hovi.discrete.grid import DiscretePath
 from hovi.discrete.instants import Instants
 from hovi.optimize.banded_model import BandModel
@@ -25,8 +27,6 @@ from hovi.planning.clearance.clearance_violation import (
     approach_sentence,
     near_pairs,
 )
-from hovi.planning.conditions.excess import excess_of, worst
-from hovi.planning.conditions.places import AtPoints
 from hovi.planning.problem.limit_conditions import LimitRange, limit_conditions
 from hovi.planning.problem.limits import Limits
 from hovi.planning.problem.presolve.end_torques import static_sentence

@@ -14,12 +14,12 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
+from hovi.conditions.condition import linear_at
 from hovi.discrete.grid import DiscretePath
 from hovi.discrete.guess import Curve, stretched
 from hovi.discrete.state import State
 from hovi.errors import ChartError
 from hovi.planning.clearance.distances import Distances
-from hovi.planning.conditions.condition import linear_at
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.scene.segmented_lagrangian import NODE_TOLERANCE
 from hovi.system.dataclass import dataclass

@@ -16,11 +16,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from hovi.conditions.condition import Condition, scales
+from hovi.conditions.joint_quantity import DERIVATIVES, JointQuantity
+from hovi.conditions.places import ControlPoints
 from hovi.discrete.interval_paths import scaled_data
 from hovi.discrete.trajectory import Trajectory
-from hovi.planning.conditions.condition import Condition, scales
-from hovi.planning.conditions.joint_quantity import DERIVATIVES, JointQuantity
-from hovi.planning.conditions.places import ControlPoints
 from hovi.planning.problem.limit_conditions import LimitRange
 from hovi.planning.problem.way_back.excused import Excused
 from hovi.schemes.control_points import control_rows

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from hovi.conditions.condition import missed
 from hovi.discrete.grid import DiscretePath
 from hovi.discrete.trajectory import Trajectory
-from hovi.planning.conditions.condition import missed
 from hovi.planning.problem.conditions_of import ends_of
 from hovi.planning.problem.notation.goal_turns import turns_missed
 from hovi.planning.problem.problem import TrajectoryProblem

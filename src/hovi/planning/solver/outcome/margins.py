@@ -7,11 +7,11 @@ from dataclasses import field
 from typing import Any
 
 from hovi.checks.arguments import check_arguments
+from hovi.conditions.excess import excess_along
+from hovi.conditions.missed_along import missed_along
 from hovi.discrete.trajectory import Trajectory
 from hovi.planning.clearance.clearance_violation import nearest_pair
 from hovi.planning.clearance.distances import distances_between
-from hovi.planning.conditions.excess import excess_along
-from hovi.planning.conditions.missed_along import missed_along
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.outcome.limit_margins import LimitMargins, limit_margins
 from hovi.system.dataclass import dataclass

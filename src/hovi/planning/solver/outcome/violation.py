@@ -5,18 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from typing import Any
 
+from hovi.conditions.condition import Condition, missed, whose
+from hovi.conditions.excess import excess_of, worst
+from hovi.conditions.missed_along import worst_along
+from hovi.conditions.places import Along, AtNode, AtPoints, ControlPoints, Exchange
 from hovi.discrete.trajectory import Trajectory
 from hovi.planning.clearance.clearance_violation import (
     approach_along,
     approach_sentence,
     near_pairs,
 )
-from hovi.planning.conditions.condition import Condition, missed, whose
-from hovi.planning.conditions.excess import excess_of, worst
-from hovi.planning.conditions.missed_along import worst_along
-from hovi.planning.conditions.pair_distances import PairDistances
-from hovi.planning.conditions.places import Along, AtNode, AtPoints, ControlPoints, Exchange
 from hovi.planning.problem.conditions_of import conditions_of
+from hovi.planning.problem.pair_distances import PairDistances
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.outcome.control_polygons import exceeds

@@ -13,15 +13,15 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from hovi.conditions.asked import times_of
+from hovi.conditions.condition import Condition
+from hovi.conditions.places import AtTimes
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import DiscretePath, Grid
 from hovi.discrete.path_on_grid import path_on_grid
 from hovi.discrete.state import State
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError
-from hovi.planning.conditions.asked import times_of
-from hovi.planning.conditions.condition import Condition
-from hovi.planning.conditions.places import AtTimes
 from hovi.planning.problem.clock import SAME_LENGTH
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.goals import Via

@@ -7,20 +7,20 @@ from typing import Any, cast
 import numpy as np
 import numpy.typing as npt
 
-from hovi.discrete.cells import INSTANTS, Cells
-from hovi.discrete.trajectory import Trajectory
-from hovi.dynamics.torque_rate import TorqueRate
-from hovi.planning.conditions.condition import Condition, scales
-from hovi.planning.conditions.function import Points
-from hovi.planning.conditions.joint_quantity import JointQuantity
-from hovi.planning.conditions.narrow import (
+from hovi.conditions.condition import Condition, scales
+from hovi.conditions.function import Points
+from hovi.conditions.joint_quantity import JointQuantity
+from hovi.conditions.narrow import (
     NO_BOUND,
     PEAK_FRACTION,
     NarrowCells,
     TorqueCells,
     features_of,
 )
-from hovi.planning.conditions.sets import Between, TwoSided
+from hovi.conditions.sets import Between, TwoSided
+from hovi.discrete.cells import INSTANTS, Cells
+from hovi.discrete.trajectory import Trajectory
+from hovi.dynamics.torque_rate import TorqueRate
 from hovi.system.deadline import raise_if_late
 
 Array = npt.NDArray[np.float64]

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from hovi.checks.units import as_duration, as_time_limit, number_and_unit, seconds
 from hovi.errors import InputError
-from hovi.planning.problem.units import as_duration, as_time_limit, number_and_unit, seconds
 
 
 @pytest.mark.parametrize(

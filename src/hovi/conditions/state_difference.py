@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from hovi.planning.conditions.condition import TOLERANCE
-from hovi.planning.conditions.function import Function, Points, Slopes
-from hovi.planning.conditions.joint_quantity import DERIVATIVES, QUANTITIES
+from hovi.conditions.condition import TOLERANCE
+from hovi.conditions.function import Function, Points, Slopes
+from hovi.conditions.joint_quantity import DERIVATIVES, QUANTITIES
 from hovi.robot.space.coordinates import Coordinates
 from hovi.system.dataclass import dataclass
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from hovi.planning.conditions.condition import Condition
-from hovi.planning.conditions.places import AtPoints
-from hovi.planning.conditions.power import power_limit
-from hovi.planning.conditions.sets import Between
+from hovi.conditions.condition import Condition
+from hovi.conditions.places import AtPoints
+from hovi.conditions.power import power_limit
+from hovi.conditions.sets import Between
 from hovi.robot.space.coordinates import Coordinates
 
 Named = Callable[[Coordinates, dict[int, tuple[float, float]]], Condition[Between, AtPoints]]

@@ -13,12 +13,12 @@ import casadi as ca
 import numpy as np
 import numpy.typing as npt
 
+from hovi.conditions.function import ARGUMENTS, Curvature, Function, Points, Slopes
 from hovi.discrete.cells import CHANGE
 from hovi.dynamics.point_function import PointFunction
 from hovi.effects.expressions.enclosure import Enclosed, Enclosure
 from hovi.effects.expressions.interval_rules import Bound
 from hovi.errors import InputError, reason
-from hovi.planning.conditions.function import ARGUMENTS, Curvature, Function, Points, Slopes
 from hovi.robot.robot import Robot
 from hovi.robot.space import tangent
 from hovi.robot.space.configuration_space import ConfigurationSpace

@@ -9,18 +9,18 @@ from typing import Any
 
 import numpy as np
 
-from hovi.discrete.cells import INSTANTS
-from hovi.discrete.grid import Grid
-from hovi.errors import InputError
-from hovi.planning.conditions.condition import (
+from hovi.conditions.condition import (
     Condition,
     Equation,
     EquationAlong,
     Inequality,
     with_function,
 )
-from hovi.planning.conditions.places import Along, AtNode, AtTimes
-from hovi.planning.conditions.sets import Between
+from hovi.conditions.places import Along, AtNode, AtTimes
+from hovi.conditions.sets import Between
+from hovi.discrete.cells import INSTANTS
+from hovi.discrete.grid import Grid
+from hovi.errors import InputError
 from hovi.robot.space.coordinates import Coordinates
 from hovi.scene.segmented_lagrangian import NODE_TOLERANCE
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import hovi
-from hovi.planning.conditions.condition import with_function
-from hovi.planning.conditions.function import Points
+from hovi.conditions.condition import with_function
+from hovi.conditions.function import Points
 from hovi.planning.problem.limits import as_limits
 from hovi.planning.solver.condition_outputs import ConditionOutputs
 from hovi.schemes import galerkin

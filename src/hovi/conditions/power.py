@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import casadi as ca
 
-from hovi.planning.conditions.condition import Condition
-from hovi.planning.conditions.places import AtPoints
-from hovi.planning.conditions.sets import Between
+from hovi.conditions.condition import Condition
+from hovi.conditions.places import AtPoints
+from hovi.conditions.sets import Between
 from hovi.robot.space.coordinates import Coordinates
 
 

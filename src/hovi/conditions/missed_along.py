@@ -8,10 +8,10 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from hovi.conditions.condition import EVERYWHERE, Condition, EquationAlong
+from hovi.conditions.excess import in_words, largest_excess
+from hovi.conditions.sets import Near
 from hovi.discrete.trajectory import Trajectory
-from hovi.planning.conditions.condition import EVERYWHERE, Condition, EquationAlong
-from hovi.planning.conditions.excess import in_words, largest_excess
-from hovi.planning.conditions.sets import Near
 
 Array = npt.NDArray[np.float64]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from hovi.planning.conditions.function import Function, Points, Slopes
+from hovi.conditions.function import Function, Points, Slopes
 from hovi.robot.space.configuration_space import ConfigurationSpace
 from hovi.robot.space.coordinates import Coordinates
 from hovi.system.dataclass import dataclass

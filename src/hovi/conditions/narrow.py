@@ -15,6 +15,10 @@ import casadi as ca
 import numpy as np
 import numpy.typing as npt
 
+from hovi.conditions.condition import Condition, scales
+from hovi.conditions.expression import Expression
+from hovi.conditions.function import ARGUMENTS, Points
+from hovi.conditions.sets import Between
 from hovi.discrete.cells import (
     CHANGE,
     FIRST_CELLS,
@@ -27,10 +31,6 @@ from hovi.discrete.cells import (
 from hovi.discrete.grid import Grid
 from hovi.discrete.trajectory import Trajectory
 from hovi.effects.expressions.enclosure import Enclosure
-from hovi.planning.conditions.condition import Condition, scales
-from hovi.planning.conditions.expression import Expression
-from hovi.planning.conditions.function import ARGUMENTS, Points
-from hovi.planning.conditions.sets import Between
 from hovi.scene.effect_bounds import effect_bounds
 from hovi.scene.scene import Scene
 from hovi.system.dataclass import dataclass

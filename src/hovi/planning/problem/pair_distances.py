@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from hovi.conditions.function import Function, Points, Slopes
 from hovi.planning.clearance.distances import Distances
-from hovi.planning.conditions.function import Function, Points, Slopes
 from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]

@@ -13,12 +13,12 @@ import numpy.typing as npt
 from hovi.checks.arguments import check_arguments_except
 from hovi.checks.kinds import is_number
 from hovi.checks.shapes import numbers_of
+from hovi.conditions.expression import Expression, FunctionLike, function_of
+from hovi.conditions.function import Function, linear
+from hovi.conditions.places import Along, AtNode, AtPoints, AtTimes, Where
+from hovi.conditions.sets import Between, Equal, TwoSided
 from hovi.discrete.grid import DiscretePath
 from hovi.errors import InputError
-from hovi.planning.conditions.expression import Expression, FunctionLike, function_of
-from hovi.planning.conditions.function import Function, linear
-from hovi.planning.conditions.places import Along, AtNode, AtPoints, AtTimes, Where
-from hovi.planning.conditions.sets import Between, Equal, TwoSided
 from hovi.robot.space.coordinates import Coordinates
 from hovi.system.dataclass import dataclass
 

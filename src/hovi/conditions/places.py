@@ -6,9 +6,9 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.checks.shapes import numbers_of
+from hovi.conditions.function import Points
 from hovi.discrete.grid import DiscretePath
 from hovi.errors import InputError
-from hovi.planning.conditions.function import Points
 from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
