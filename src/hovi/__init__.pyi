@@ -1,6 +1,7 @@
 """The public names of hovi: read by type checkers, and by `lazy_loader` when hovi is imported."""
 
 from . import accuracy as accuracy
+from . import conditions as conditions
 from . import effects as effects
 from . import schemes as schemes
 from . import symbolic as symbolic

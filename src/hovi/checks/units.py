@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,7 @@ FRACTIONS = {"": 1.0, "%": 1e-2}
 DURATIONS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0, "h": 3600.0}
 """Units of durations, in [s]."""
 _TEXT = re.compile(r"([0-9.]+(?:[eE][+-]?[0-9]+)?)\s*([^\W\d]*|%)")
+_MEASURE = re.compile(r"([0-9]*\.?[0-9]+(?:[eE][+-]?[0-9]+)?)\s*([a-z]*(?:/s(?:\^2)?)?)")
 
 SECONDS_IN_WORDS = 'a positive number of seconds, or a text such as "500 ms"'
 """What a given duration or a time is, in messages about scene files and in Python."""
@@ -63,6 +65,52 @@ def seconds(given: Any, what: str) -> float:
     if unit not in DURATIONS:
         raise InputError(f"{what} {given!r} has the unit {unit!r}: {nearest(unit, DURATIONS)}")
     return number * DURATIONS[unit]
+
+
+def length(given: Any, what: str) -> float:
+    """A positive length in [m], from a number or a text such as "5 mm". Raises InputError."""
+    return _measure(given, what, LENGTHS, "metres", "5 mm")
+
+
+def angle(given: Any, what: str) -> float:
+    """A positive angle in [rad], from a number or a text such as "5 deg". Raises InputError."""
+    return _measure(given, what, ANGLES, "radians", "5 deg")
+
+
+def speed(given: Any, what: str) -> float:
+    """A positive speed in [m/s], from a number or a text such as "250 mm/s". Raises InputError."""
+    return _measure(given, what, _per_second(LENGTHS), "m/s", "250 mm/s")
+
+
+def angular_speed(given: Any, what: str) -> float:
+    """The same in [rad/s], such as "30 deg/s". Raises InputError."""
+    return _measure(given, what, _per_second(ANGLES), "rad/s", "30 deg/s")
+
+
+def acceleration(given: Any, what: str) -> float:
+    """The same in [m/s^2], such as "2 m/s^2". Raises InputError."""
+    return _measure(given, what, _per_second(_per_second(LENGTHS)), "m/s^2", "2 m/s^2")
+
+
+def _per_second(units: Mapping[str, float]) -> dict[str, float]:
+    """The units of a rate: "m/s" of "m", and "m/s^2" of that."""
+    return {f"{x}^2" if x.endswith("/s") else f"{x}/s": size for x, size in units.items()}
+
+
+def _measure(given: Any, what: str, units: Mapping[str, float], of: str, such: str) -> float:
+    """A positive number, in the first of some units, or a text with any of them."""
+    number, unit = given, next(iter(units))
+    if isinstance(given, str):
+        parsed = _MEASURE.fullmatch(given.strip())
+        number, unit = (float(parsed[1]), parsed[2]) if parsed else (None, "")
+        if parsed and unit not in units:
+            raise InputError(f"{what} {given!r} has the unit {unit!r}: {nearest(unit, units)}")
+    if not is_number(number) or not 0 < _as_double(number, what) * units[unit] < math.inf:
+        raise InputError(
+            f"{what} must be a positive number of {of} or a text such as {such!r}, got "
+            f"{shown(given)}."
+        )
+    return float(number) * units[unit]
 
 
 def as_time_limit(given: float | str | None) -> float | None:

@@ -61,6 +61,10 @@ class Expression(Function):
             vars(later)["rate"] = self.rate.from_time(time)
         return later
 
+    def minus(self, offset: Callable[[ca.SX], ca.SX]) -> Expression:
+        """y(q, v, a, tau, t) - offset(t)."""
+        return Expression(self._symbols, self._y - offset(self._symbols["t"]), self._space)
+
     @cached_property
     def rate(self) -> Function:
         """dy/dt of y(q, t)."""

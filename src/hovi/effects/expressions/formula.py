@@ -153,6 +153,8 @@ class _Reader:
         """One row of the symbol of a name with two names in brackets."""
         column, table = self.entry(name, key), self.symbols[name]
         rows = table.components if isinstance(table, Table) else ()
+        if type(component) is int and 0 <= component < len(rows):
+            return column[component]
         if component not in rows:
             hint = nearest(str(component), rows) if rows else "give one name in brackets"
             raise self.refused(f"names the component {component!r} of {name!r}: {hint}")
@@ -201,6 +203,11 @@ def _walk(node: ast.expr, reader: _Reader, depth: int) -> ca.SX:
         case ast.Subscript(
             value=ast.Name(id=name),
             slice=ast.Tuple(elts=[ast.Constant(value=key), ast.Constant(value=component)]),
+        ):
+            return reader.component(name, key, component)
+        case ast.Subscript(
+            value=ast.Subscript(value=ast.Name(id=name), slice=ast.Constant(value=key)),
+            slice=ast.Constant(value=component),
         ):
             return reader.component(name, key, component)
         case ast.UnaryOp(op=ast.USub() | ast.UAdd() as sign, operand=inner):

@@ -34,8 +34,9 @@ def cost_symbols(robot: Robot, symbols: SceneSymbols, tau: ca.SX) -> Symbols:
     """The symbols of formulas of a running cost; what a formula does not name is not built.
 
     q, v, a, tau: by coordinate name, or all as a column. position, velocity, acceleration: of the
-    origin of a frame in the world, by frame and axis, in [m], [m/s] and [m/s^2]. base_force,
-    base_moment: see `base_reaction`.
+    origin of a frame in the world, by frame and axis, in [m], [m/s] and [m/s^2]. x_axis, y_axis,
+    z_axis: the axes of a frame in the world, by frame and component; they are the columns of its
+    rotation. base_force, base_moment: see `base_reaction`.
     """
     columns = {"v": symbols.v, "a": symbols.a, "tau": tau}
     if len(positioned(robot)) == robot.nv:
@@ -45,7 +46,10 @@ def cost_symbols(robot: Robot, symbols: SceneSymbols, tau: ca.SX) -> Symbols:
     for name in ("q", "v", "a", "tau"):
         known[name] = _by_joint(known[name], columns.get(name))
     for order, name in enumerate(("position", "velocity", "acceleration")):
-        entry = functools.partial(_frame, robot, symbols, order)
+        entry = functools.partial(frame_column, robot, symbols, order)
+        known[name] = Table(robot.frame_names, entry, components=AXES, kind="frame")
+    for number, name in enumerate(("x_axis", "y_axis", "z_axis")):
+        entry = functools.partial(_axis, robot, symbols, number)
         known[name] = Table(robot.frame_names, entry, components=AXES, kind="frame")
     reaction = functools.cache(lambda: base_reaction(robot, symbols))
     for part, name in enumerate(("base_force", "base_moment")):
@@ -87,7 +91,7 @@ def _by_axis(reaction: Callable[[], tuple[ca.SX, ca.SX]], part: int) -> Table:
     )
 
 
-def _frame(robot: Robot, symbols: SceneSymbols, order: int, frame: str) -> ca.SX:
+def frame_column(robot: Robot, symbols: SceneSymbols, order: int, frame: str) -> ca.SX:
     """The origin of a frame in the world, or its first or second derivative, shape (3,)."""
     motion = frame_motion(robot, symbols, frame)
     if order < 2:
@@ -96,3 +100,8 @@ def _frame(robot: Robot, symbols: SceneSymbols, order: int, frame: str) -> ca.SX
     changes = (q, motion.rate), (v, a), (t, ca.SX(1))
     parts = [ca.jtimes(motion.velocity, x, dx) for x, dx in changes]
     return parts[0] + parts[1] + parts[2]
+
+
+def _axis(robot: Robot, symbols: SceneSymbols, number: int, frame: str) -> ca.SX:
+    """An axis of a frame in the world, shape (3,)."""
+    return frame_motion(robot, symbols, frame).rotation[:, number]

@@ -17,6 +17,7 @@ import pinocchio as pin
 from hovi.checks.arguments import check_arguments
 from hovi.checks.directions import unit_vector
 from hovi.checks.shapes import numbers_of
+from hovi.conditions.frame_rows import axis_rows, rotation_rows
 from hovi.conditions.function import Curvature, Function, Points, Slopes
 from hovi.dynamics.point_function import PointFunction
 from hovi.dynamics.symbolic_dynamics import casadi_functions
@@ -255,13 +256,9 @@ class PoseDifference(Function):
         if self.goal.position is not None:
             rows.append(p - ca.DM(np.asarray(self.goal.position)))
         if self.goal.rotation is not None:
-            target = ca.DM(np.asarray(self.goal.rotation))
-            turns = [ca.cross(target[:, i], R[:, i]) for i in range(3)]
-            rows.append((turns[0] + turns[1] + turns[2]) / 2)
+            rows.append(rotation_rows(R, np.asarray(self.goal.rotation)))
         if self.goal.directions is not None:
-            inner, world = self.goal.directions
-            across = np.linalg.svd(world[None])[2][1:]  # two directions orthogonal to the target
-            rows.append(ca.DM(across) @ (R @ ca.DM(inner)))
+            rows.append(axis_rows(R, *self.goal.directions))
         return ca.vertcat(*rows)
 
     @cached_property

@@ -39,7 +39,10 @@ from hovi.schemes import Scheme, by_name
 from hovi.system.dataclass import dataclass
 
 if TYPE_CHECKING:
+    from hovi.conditions.kept.keep import Keep
+    from hovi.discrete.state import State
     from hovi.planning.obstacles.grasped import Grasped
+    from hovi.planning.problem.frame_goal import FrameGoal
 
 DEFAULT_TOLERANCE = 1e-3
 """Relative tolerance of the cost if neither scheme, intervals nor tolerance are named."""
@@ -56,7 +59,7 @@ INTERVALS_TWICE = "`intervals` and `scheme.intervals` are the same: leave one of
 MAX_INTERVALS = 1_000_000
 """Maximum number of intervals that may be requested."""
 _CHECKED_HERE = (
-    *("via", "conditions", "scheme", "intervals", "starts", "seed", "obstacles", "grasped"),
+    *("via", "conditions", "keep", "scheme", "intervals", "starts", "seed", "obstacles", "grasped"),
     *("margin", "max_iterations", "time_limit", "processes"),
 )
 """Options whose own checks say more than their annotations."""
@@ -96,6 +99,11 @@ class PlanOptions:
         "hovi.Condition: bounds of functions of q, v, a, tau and t along the whole motion, such as "
         'hovi.Condition("tau * v", hovi.Between(-80, 80), name="power"), or their values at given '
         "times.",
+    )
+    keep: Sequence[Keep | Mapping[str, Any]] = option(
+        (),
+        "what the whole motion keeps: members of hovi.conditions, such as "
+        'hovi.conditions.Upright("tool0"), or tables as in a scene file.',
     )
     scheme: str | Scheme | None = option(
         None,
@@ -232,6 +240,10 @@ class PlanOptions:
             raise InputError(f"via must be a list of hovi.Via(time, goal), got {via!r}.")
         object.__setattr__(self, "via", tuple(as_via(each, i) for i, each in enumerate(via)))
         object.__setattr__(self, "conditions", as_conditions(self.conditions))
+        if not isinstance(self.keep, tuple) or self.keep:
+            from hovi.conditions.kept.kinds import as_kept  # 10 ms
+
+            object.__setattr__(self, "keep", as_kept(self.keep))
         if not isinstance(self.grasped, tuple) or self.grasped:
             from hovi.planning.obstacles.grasped import as_grasped  # 10 ms
 
@@ -284,7 +296,7 @@ class PlanOptions:
     @property
     def _limited(self) -> bool:
         """Whether a motion has bounds, between which more points leave it less room."""
-        if self.conditions:
+        if self.conditions or self.keep:
             return True
         if isinstance(self.limits, Limits):
             return bool(self.limits.bounded.any() or self.limits.conditions)
@@ -344,6 +356,25 @@ class PlanOptions:
         from hovi.planning.obstacles.grasped import scene_holding  # 10 ms
 
         return scene_holding(scene, tuple(self.grasped))
+
+    def keeping(
+        self,
+        robot: Robot,
+        start: State | FrameGoal,
+        goal: State | FrameGoal | None,
+        duration: float | tuple[float, float],
+    ) -> Self:
+        """These options with the conditions of what is kept between two ends.
+
+        Raises InputError as conditions_kept does, and for a condition that has a name twice.
+        """
+        if not self.keep:
+            return self
+        from hovi.conditions.kept.kinds import as_kept  # 10 ms
+        from hovi.planning.problem.kept_conditions import conditions_kept
+
+        kept = conditions_kept(as_kept(self.keep), robot, start, goal, duration)
+        return self.with_changes(keep=(), conditions=(*self.conditions, *kept))
 
     def aiming(self, scene: Scene) -> Scene:
         """The scene with the effects of the objective. Raises InputError as with_objective does."""

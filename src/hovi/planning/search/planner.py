@@ -12,6 +12,7 @@ import numpy as np
 
 from hovi.checks.arguments import check_arguments_except
 from hovi.checks.units import Duration, as_duration
+from hovi.conditions.kept.kinds import as_kept
 from hovi.discrete.output.caution import COLLISION, LEFT_OUT, STATUS, WARNED, Caution
 from hovi.discrete.state import State, warn_of_degrees
 from hovi.discrete.trajectory import Trajectory
@@ -22,6 +23,8 @@ from hovi.planning.clearance.self_collisions import not_looked_at, pairs_left_ou
 from hovi.planning.problem.clock import Clock
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.goals import Via
+from hovi.planning.problem.inverse_kinematics import position_bounds
+from hovi.planning.problem.kept_conditions import goal_kept
 from hovi.planning.problem.notation.ends import End, as_end
 from hovi.planning.problem.notation.goal_turns import says_turns, turns_sentence
 from hovi.planning.problem.notation.smoothing import smoothed
@@ -157,6 +160,10 @@ def _planned(
     began: when the plan did, by the clock; now by default.
     """
     began = time.perf_counter() if began is None else began
+    if options.keep:
+        bounds = position_bounds(scene.robot, options.limits)
+        goal = goal_kept(as_kept(options.keep), scene.robot, start, goal, bounds)
+        options = options.keeping(scene.robot, start, goal, duration)
     given = start, goal
     chosen, apart = kept_apart(options.on(scene), scene.robot, ends_of(*given, options.via))
     deadline = Deadline(chosen.time_limit_seconds)

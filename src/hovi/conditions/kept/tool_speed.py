@@ -1,0 +1,101 @@
+"""Limits on the speed and on the acceleration of a frame."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import ClassVar
+
+import casadi as ca
+
+from hovi.checks.units import acceleration, angular_speed, speed
+from hovi.conditions.condition import Condition
+from hovi.conditions.kept.keep import Conditions, EndPoses, KeepFrame, placement
+from hovi.conditions.places import AtPoints
+from hovi.conditions.sets import Between
+from hovi.effects.expressions.formula_symbols import frame_column
+from hovi.effects.expressions.symbols import SceneSymbols
+from hovi.errors import InputError
+from hovi.robot.robot import Robot
+from hovi.robot.space.configuration_rate import configuration_rate
+from hovi.system.dataclass import dataclass
+
+
+@dataclass(frozen=True, eq=False)
+class ToolSpeed(KeepFrame):
+    """The speed of a frame's origin, |p'| <= linear, and of its turn, |w| <= angular.
+
+    linear: in [m/s] or as "250 mm/s". angular: in [rad/s] or as "30 deg/s". One of them at least.
+    """
+
+    linear: float | str | None = None
+    angular: float | str | None = None
+    kind: ClassVar[str] = "tool_speed"
+
+    def check_values(self) -> None:
+        """See Keep."""
+        if self.linear is None and self.angular is None:
+            raise InputError(f"{self.subject} needs a speed: give `linear` or `angular`.")
+        if self.linear is not None:
+            speed(self.linear, f"`linear` of {self.subject}")
+        if self.angular is not None:
+            angular_speed(self.angular, f"`angular` of {self.subject}")
+
+    def conditions(self, robot: Robot, ends: EndPoses) -> Conditions:
+        """See Keep."""
+        self.check(robot)
+        at, found = placement(robot, self.frame), list[Condition[Between, AtPoints]]()
+
+        def linear(q: ca.SX, v: ca.SX) -> ca.SX:
+            return ca.sumsqr(_derivative(robot, self.frame, q, v))
+
+        def angular(q: ca.SX, v: ca.SX) -> ca.SX:
+            turn = ca.jtimes(ca.vec(at(q)[0]), q, configuration_rate(robot.model, q, v))
+            return ca.sumsqr(turn) / 2  # |w|^2 of R' = [w] R
+
+        if self.linear is not None:
+            found.append(_at_most(speed(self.linear, self.subject), linear, self.title, "(m/s)^2"))
+        if self.angular is not None:
+            title = f"{self.title} (turn)" if found else self.title
+            found.append(
+                _at_most(angular_speed(self.angular, self.subject), angular, title, "(rad/s)^2")
+            )
+        return tuple(found)
+
+
+@dataclass(frozen=True, eq=False)
+class ToolAcceleration(KeepFrame):
+    """The acceleration of a frame's origin, |p''| <= linear.
+
+    linear: in [m/s^2] or as "2 m/s^2".
+    """
+
+    linear: float | str
+    kind: ClassVar[str] = "tool_acceleration"
+
+    def check_values(self) -> None:
+        """See Keep."""
+        acceleration(self.linear, self.subject)
+
+    def conditions(self, robot: Robot, ends: EndPoses) -> Conditions:
+        """See Keep."""
+        self.check(robot)
+
+        def squared(q: ca.SX, v: ca.SX, a: ca.SX) -> ca.SX:
+            return ca.sumsqr(_derivative(robot, self.frame, q, v, a))
+
+        return (
+            _at_most(acceleration(self.linear, self.subject), squared, self.title, "(m/s^2)^2"),
+        )
+
+
+def _derivative(robot: Robot, frame: str, q: ca.SX, v: ca.SX, a: ca.SX | None = None) -> ca.SX:
+    """The velocity of a frame's origin, or its acceleration, (3,)."""
+    order, rest = (1, ca.SX.zeros(robot.nv)) if a is None else (2, a)
+    return frame_column(robot, SceneSymbols(q, v, rest, ca.SX.sym("t")), order, frame)
+
+
+def _at_most(
+    size: float, squared: Callable[..., ca.SX], title: str, unit: str
+) -> Condition[Between, AtPoints]:
+    """A size whose square is a function of the motion."""
+    return Condition(squared, Between(upper=size**2), name=title, unit=unit, scale=size**2)
