@@ -17,12 +17,13 @@ from hovi.conditions.expression import Expression, FunctionLike, function_of
 from hovi.conditions.function import Function, linear
 from hovi.conditions.places import Along, AtNode, AtPoints, AtTimes, Where
 from hovi.conditions.sets import Between, Equal, TwoSided
-from hovi.discrete.grid import DiscretePath
+from hovi.discrete.grid import DiscretePath, Grid
 from hovi.errors import InputError
 from hovi.robot.space.coordinates import Coordinates
 from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
+Mask = npt.NDArray[np.bool_]
 Values = TypeVar("Values", bound=Equal | TwoSided, covariant=True)
 Place = TypeVar("Place", bound=Where, covariant=True)
 
@@ -50,6 +51,8 @@ class Condition(Generic[Values, Place]):
     tolerance: at least 1e-6: the fraction of the scale by which a bound may be exceeded anywhere;
         by how much y may miss a value between the nodes of a grid, in the unit of y. Values have no
         scale, and those at given times no tolerance: they are missed by at most 1e-6.
+    during: (begin, end) in [s], the part of the motion in which it holds, between which grids have
+        nodes; the whole motion if None.
     Raises InputError for anything else.
     """
 
@@ -61,6 +64,7 @@ class Condition(Generic[Values, Place]):
     scale: npt.ArrayLike | None = None
     tolerance: float = TOLERANCE
     of: Sequence[str] = ()
+    during: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
         if not (isinstance(self.function, str | Function) or callable(self.function)):
@@ -79,6 +83,8 @@ class Condition(Generic[Values, Place]):
                 f"not {self.tolerance!r}."
             )
         timed = isinstance(self.where, AtTimes) and self.tolerance != TOLERANCE
+        if self.during is not None:
+            _require_part(self)
         if isinstance(self.on, Equal) and (self.scale is not None or timed):
             raise InputError(
                 f"condition {self.name!r} has a value: leave its `scale` out, which is that of "
@@ -109,10 +115,22 @@ class Condition(Generic[Values, Place]):
 
     def from_time(self, time: float) -> Self:
         """The same by a clock that starts at a time, in [s], but for the times of its place."""
-        if not self.timed:
+        if not self.timed and self.during is None:
             return self
         on: Any = self.on.from_time(time)
-        return dataclasses.replace(self, function=self.y.from_time(time), on=on)
+        part = self.during and (self.during[0] - time, self.during[1] - time)
+        return dataclasses.replace(self, function=self.y.from_time(time), on=on, during=part)
+
+    def holds_at(self, t: Array) -> Mask:
+        """Where it holds, at times in [s] that are no nodes of a grid: shape of t."""
+        if self.during is None:
+            return np.ones(np.shape(t), dtype=bool)
+        begin, end = self.during
+        return np.asarray((begin < t) & (t < end))
+
+    def holds_in(self, grid: Grid) -> Mask:
+        """The intervals of a grid in which it holds, shape (N,)."""
+        return self.holds_at(grid.t[:-1] + grid.steps / 2)
 
 
 def _require_place(given: Condition[Any, Any]) -> None:
@@ -125,6 +143,23 @@ def _require_place(given: Condition[Any, Any]) -> None:
     if isinstance(given.on, TwoSided) and isinstance(given.where, AtNode | AtTimes | Along):
         raise InputError(
             f"condition {given.name!r} has bounds, which hold at all times: leave `where` out."
+        )
+
+
+def _require_part(given: Condition[Any, Any]) -> None:
+    """Raise InputError for a part of a motion that is none, and for times in a part."""
+    try:
+        begin, end = (float(t) for t in given.during or ())
+    except (TypeError, ValueError):
+        begin = end = np.nan
+    if not (np.isfinite([begin, end]).all() and begin < end):
+        raise InputError(
+            f"`during` of condition {given.name!r} must be (begin, end) in [s], two ascending "
+            f"times, got {given.during!r}."
+        )
+    if isinstance(given.where, AtTimes):
+        raise InputError(
+            f"condition {given.name!r} is asked at given times: leave its `during` out."
         )
 
 

@@ -126,7 +126,10 @@ def _values(
 def _over(motion: Trajectory, given: Condition[TwoSided, Any], k: Index, s: Array) -> Array:
     """low - y and y - high over the scale at relative positions s in intervals k, (2, M, size)."""
     y, low, high, _ = _values(motion, given, k, s)
-    return np.maximum(np.stack([low - y, y - high]) / scales(given), -NO_BOUND)
+    over = np.maximum(np.stack([low - y, y - high]) / scales(given), -NO_BOUND)
+    if given.during is not None:
+        over[:, ~given.holds_in(motion.grid)[k]] = -NO_BOUND
+    return over
 
 
 def _points(motion: Trajectory, k: Index, s: Array, needs: frozenset[str]) -> Points:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -60,7 +60,8 @@ def worst_along(along: Sequence[EquationAlong], motion: Trajectory) -> MissedAlo
 
 def _missed(given: EquationAlong, motion: Trajectory) -> MissedAlong:
     room, names = Near(given.on.value, given.tolerance), (given.name, given.unit)
-    accepted = Condition(given.y, room, EVERYWHERE, *names, scale=given.tolerance, of=given.of)
+    more: dict[str, Any] = {"scale": given.tolerance, "of": given.of, "during": given.during}
+    accepted = Condition(given.y, room, EVERYWHERE, *names, **more)
     excess, at = largest_excess(motion, accepted)
     side, k, entry = np.unravel_index(int(np.argmax(excess)), excess.shape)
     time = float(motion.t[k] + at[side, k, entry] * motion.grid.steps[k])

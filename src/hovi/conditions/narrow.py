@@ -170,6 +170,7 @@ class NarrowCells:
         holds = np.zeros(P, dtype=bool)
         if self._of.whole:
             holds = np.asarray((bounds.upper <= 0.0).all(axis=1))
+        holds |= ~self._given.holds_in(self._grid)[cells.interval]
         return ~holds, ~bounds.calm & ~holds
 
 

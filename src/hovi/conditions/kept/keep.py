@@ -77,12 +77,16 @@ class Keep(ABC):
     def check(self, robot: Robot) -> None:
         """Raise InputError if it is not valid for the robot."""
 
-    @abstractmethod
-    def conditions(self, robot: Robot, ends: EndPoses) -> Conditions:
-        """The conditions on a robot. ends: what is not said is taken from there.
+    def resolved(self, ends: EndPoses) -> Self:
+        """The same with what is not said taken from the ends of a motion; itself by default.
 
-        Raises InputError as `check`, and where an end does not say it either.
+        Raises InputError where an end does not say it either.
         """
+        return self
+
+    @abstractmethod
+    def conditions(self, robot: Robot) -> Conditions:
+        """The conditions on a robot, of what is `resolved`. Raises InputError as `check`."""
 
     @property
     def centered(self) -> Self:
@@ -138,12 +142,12 @@ class KeepFrame(Keep):
             raise InputError(f"the `{name}` of {self.subject} has length zero; give a direction.")
         return unit_vector(vector)
 
-    def _point(self, given: Any, ends: EndPoses) -> Array:
+    def _point(self, given: Any, ends: EndPoses) -> list[float]:
         """A given point, or where the frame is at the start, (3,). Raises InputError."""
         p = ends.start(self.frame).position if given is None else self._vector("point", given)
         if p is None:
             raise self._missing("point", "start")
-        return p
+        return [float(x) for x in p]
 
     def _missing(self, name: str, end: str) -> InputError:
         """The error for a field that is not said, and that an end does not say."""

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from dataclasses import replace
+from typing import ClassVar, Self
 
 import casadi as ca
 import numpy as np
 import numpy.typing as npt
+import pinocchio as pin
 
 from hovi.conditions.frame_rows import rotation_rows
 from hovi.conditions.kept.keep import (
@@ -62,13 +64,20 @@ class KeepOrientation(KeepFrame):
                 return rotation_from(name, getattr(self, name), self.subject)
         return None
 
-    def conditions(self, robot: Robot, ends: EndPoses) -> Conditions:
+    def resolved(self, ends: EndPoses) -> Self:
+        """See Keep."""
+        if self._given is not None:
+            return self
+        R = ends.start(self.frame).rotation
+        if R is None:
+            raise self._missing("rpy", "start")
+        return replace(self, quaternion_xyzw=pin.Quaternion(R).coeffs().tolist())
+
+    def conditions(self, robot: Robot) -> Conditions:
         """See Keep."""
         self.check(robot)
-        given = self._given
-        target = ends.start(self.frame).rotation if given is None else given
-        if target is None:
-            raise self._missing("rpy", "start")
+        target = self._given
+        assert target is not None
         at = placement(robot, self.frame)
 
         def offsets(q: ca.SX) -> ca.SX:

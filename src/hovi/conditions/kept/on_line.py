@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from dataclasses import replace
+from typing import ClassVar, Self
 
 import casadi as ca
 import numpy as np
@@ -52,23 +53,26 @@ class OnLine(KeepFrame):
         if self.point is not None:
             self._vector("point", self.point)
 
-    def conditions(self, robot: Robot, ends: EndPoses) -> Conditions:
+    def resolved(self, ends: EndPoses) -> Self:
         """See Keep."""
-        self.check(robot)
-        p0 = self._point(self.point, ends)
-        if self.direction is not None:
-            normals = across(self._direction("direction", self.direction))
-        else:
-            p1 = ends.goal(self.frame).position
-            if p1 is None:
+        point, direction = self._point(self.point, ends), self.direction
+        if direction is None:
+            end = ends.goal(self.frame).position
+            if end is None:
                 raise self._missing("direction", "goal")
-            if np.linalg.norm(p1 - p0) < LEAST_LENGTH:
+            direction = (end - np.array(point)).tolist()
+            if np.linalg.norm(direction) < LEAST_LENGTH:
                 raise InputError(
                     f"{self.subject} needs a `direction`: frame {self.frame!r} begins where it "
                     "ends."
                 )
-            normals = across((p1 - p0) / np.linalg.norm(p1 - p0))
-        at = placement(robot, self.frame)
+        return replace(self, point=point, direction=direction)
+
+    def conditions(self, robot: Robot) -> Conditions:
+        """See Keep."""
+        self.check(robot)
+        normals = across(self._direction("direction", self.direction))
+        p0, at = self._vector("point", self.point), placement(robot, self.frame)
 
         def offsets(q: ca.SX) -> ca.SX:
             return ca.DM(normals) @ (at(q)[1] - ca.DM(p0))

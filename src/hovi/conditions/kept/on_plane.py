@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from dataclasses import replace
+from typing import ClassVar, Self
 
 import casadi as ca
 import numpy.typing as npt
@@ -42,10 +43,14 @@ class OnPlane(KeepFrame):
         if self.point is not None:
             self._vector("point", self.point)
 
-    def conditions(self, robot: Robot, ends: EndPoses) -> Conditions:
+    def resolved(self, ends: EndPoses) -> Self:
+        """See Keep."""
+        return replace(self, point=self._point(self.point, ends))
+
+    def conditions(self, robot: Robot) -> Conditions:
         """See Keep."""
         self.check(robot)
-        normal, p0 = self._direction("normal", self.normal), self._point(self.point, ends)
+        normal, p0 = self._direction("normal", self.normal), self._vector("point", self.point)
         at = placement(robot, self.frame)
 
         def offsets(q: ca.SX) -> ca.SX:

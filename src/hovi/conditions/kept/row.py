@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import numpy.typing as npt
 
 from hovi.conditions.condition import TOLERANCE, Condition, with_function
-from hovi.conditions.kept.keep import Conditions, EndPoses, Keep
+from hovi.conditions.kept.keep import Conditions, Keep
 from hovi.conditions.places import Along
 from hovi.conditions.sets import Between, Equal
 from hovi.errors import InputError
@@ -58,7 +58,7 @@ class Formula(Keep):
             tolerance=self.tolerance,
         )
 
-    def conditions(self, robot: Robot, ends: EndPoses) -> Conditions:
+    def conditions(self, robot: Robot) -> Conditions:
         """See Keep."""
         return (with_function(self._condition, robot),)
 
@@ -103,7 +103,7 @@ class CasadiRow(Keep):
             tolerance=self.tolerance,
         )
 
-    def conditions(self, robot: Robot, ends: EndPoses) -> Conditions:
+    def conditions(self, robot: Robot) -> Conditions:
         """See Keep."""
         return (self._on(robot),)
 

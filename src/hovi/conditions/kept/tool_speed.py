@@ -9,7 +9,7 @@ import casadi as ca
 
 from hovi.checks.units import acceleration, angular_speed, speed
 from hovi.conditions.condition import Condition
-from hovi.conditions.kept.keep import Conditions, EndPoses, KeepFrame, placement
+from hovi.conditions.kept.keep import Conditions, KeepFrame, placement
 from hovi.conditions.places import AtPoints
 from hovi.conditions.sets import Between
 from hovi.effects.expressions.formula_symbols import frame_column
@@ -40,7 +40,7 @@ class ToolSpeed(KeepFrame):
         if self.angular is not None:
             angular_speed(self.angular, f"`angular` of {self.subject}")
 
-    def conditions(self, robot: Robot, ends: EndPoses) -> Conditions:
+    def conditions(self, robot: Robot) -> Conditions:
         """See Keep."""
         self.check(robot)
         at, found = placement(robot, self.frame), list[Condition[Between, AtPoints]]()
@@ -76,7 +76,7 @@ class ToolAcceleration(KeepFrame):
         """See Keep."""
         acceleration(self.linear, self.subject)
 
-    def conditions(self, robot: Robot, ends: EndPoses) -> Conditions:
+    def conditions(self, robot: Robot) -> Conditions:
         """See Keep."""
         self.check(robot)
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, ClassVar
+from dataclasses import replace
+from typing import Any, ClassVar, Self
 
 import casadi as ca
 import numpy as np
@@ -60,10 +61,19 @@ class Upright(KeepFrame):
         inner, world = (self._direction("axis", each) for each in given)
         return inner, world
 
-    def conditions(self, robot: Robot, ends: EndPoses) -> Conditions:
+    def resolved(self, ends: EndPoses) -> Self:
+        """See Keep."""
+        if self.axis is not None:
+            return self
+        R = ends.start(self.frame).rotation
+        if R is None:
+            raise self._missing("axis", "start")
+        return replace(self, axis=((R.T @ UP).tolist(), UP.tolist()))
+
+    def conditions(self, robot: Robot) -> Conditions:
         """See Keep."""
         self.check(robot)
-        inner, world = self._directions(ends)
+        inner, world = self._pair(self.axis)
         at = placement(robot, self.frame)
 
         def offsets(q: ca.SX) -> ca.SX:
@@ -73,11 +83,3 @@ class Upright(KeepFrame):
             return ca.sumsqr(at(q)[0] @ ca.DM(inner) - ca.DM(world))
 
         return (direction_kept(self.title, offsets, chord, self.within, self.tolerance),)
-
-    def _directions(self, ends: EndPoses) -> tuple[Array, Array]:
-        if self.axis is not None:
-            return self._pair(self.axis)
-        R = ends.start(self.frame).rotation
-        if R is None:
-            raise self._missing("axis", "start")
-        return R.T @ UP, UP

@@ -41,7 +41,7 @@ INDEPENDENT = 1e-6
 class NodeState:
     """What is given at a node.
 
-    name: of the node, in messages. q, v: there, (nq,) and (nv,); what is free has some value.
+    name: of the node, in messages; "" for a node of which nothing is known. q, v: there, (nq,) and (nv,); what is free has some value.
     free: which components of q, in the tangent space, and of v are free, (2, nv).
     """
 
@@ -109,7 +109,7 @@ def equations_at_nodes(
     found, reason, step = list[Equation](), "", grid.duration / grid.intervals
     known = zip(along, sizes, strict=True)
     for part in (part for each, size in known for part in _parts(each, size, step)):
-        for node, time in enumerate(grid.t.tolist()):
+        for node, time in _nodes_of(part.given, grid):
             where, state = AtNode(node, time), given.get(node)
             if state is None:
                 found.append(part.at(where))
@@ -119,10 +119,16 @@ def equations_at_nodes(
             kept = _independent(part.at(where), before, state, step)
             if len(kept) > 0:
                 found.append(part.some(kept).at(where))
-            if all(np.abs(_missed(x, state)).max() <= TOLERANCE for x in asked):
+            if state.name and all(np.abs(_missed(x, state)).max() <= TOLERANCE for x in asked):
                 left = np.setdiff1d(part.rows.rows, kept)
                 reason = reason or part.some(left).violated(where, state)
     return found, reason
+
+
+def _nodes_of(given: EquationAlong, grid: Grid) -> list[tuple[int, float]]:
+    """The nodes of a grid at which an equation holds, and their times."""
+    holds = np.pad(given.holds_in(grid), 1)
+    return [(i, t) for i, t in enumerate(grid.t.tolist()) if holds[i] or holds[i + 1]]
 
 
 @dataclass(frozen=True, eq=False)

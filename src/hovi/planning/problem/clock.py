@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from hovi.conditions.condition import Condition
 from hovi.discrete.grid import Grid
 from hovi.discrete.guess import Curve
 from hovi.planning.problem.goals import Via
@@ -133,6 +135,20 @@ class Clock:
         times = self.times(np.array([each.time for each in via]), now, lengths).tolist()
         moved = zip(via, times, strict=True)
         return tuple(dataclasses.replace(each, time=t) for each, t in moved)
+
+    def conditions(
+        self, given: Sequence[Condition[Any, Any]], now: Lengths, lengths: Lengths
+    ) -> tuple[Condition[Any, Any], ...]:
+        """Conditions whose parts of the motion move along with the parts."""
+        return tuple(self._moved(each, now, lengths) for each in given)
+
+    def _moved(
+        self, each: Condition[Any, Any], now: Lengths, lengths: Lengths
+    ) -> Condition[Any, Any]:
+        if each.during is None:
+            return each
+        begin, end = self.times(np.array(each.during), now, lengths).tolist()
+        return dataclasses.replace(each, during=(begin, end))
 
     def curve(self, curve: Curve, now: float, length: float, order: int) -> Curve:
         """A motion as a curve with another length of a single part. now: its own, in [s].

@@ -43,23 +43,38 @@ MOST_MISSED = {
 """By how much a start may miss a value, by the unit of y; by its tolerance in others."""
 
 
+def kept_between(
+    kept: Sequence[Keep],
+    robot: Robot,
+    start: State | FrameGoal | None,
+    goal: State | FrameGoal | Periodic | None,
+) -> tuple[Keep, ...]:
+    """What is kept, with what it does not say taken from both ends. Raises InputError."""
+    ends = EndPoses(_poses(robot, start, "start"), _poses(robot, goal, "goal"))
+    return tuple(each.resolved(ends) for each in kept)
+
+
 def conditions_kept(
     kept: Sequence[Keep],
     robot: Robot,
-    start: State | FrameGoal,
-    goal: State | FrameGoal | Periodic | None,
+    start: State | FrameGoal | None,
     duration: float | tuple[float, float],
 ) -> tuple[Condition[Any, Any], ...]:
-    """The conditions of a motion. duration: in [s], or its bounds.
+    """The conditions of what is kept, resolved. duration: of the motion, in [s], or its bounds.
+
+    start: of the motion, which enters what it misses; None for what begins later.
 
     Raises InputError where a frame or a value does not fit, and for a start that misses a value by
     more than what is entered.
     """
-    ends = EndPoses(_poses(robot, start, "start"), _poses(robot, goal, "goal"))
-    made = [with_function(x, robot) for each in kept for x in each.conditions(robot, ends)]
+    made = _on(robot, kept)
     if isinstance(start, State) and not start.free:
         made = [_entered(each, robot, start, duration) for each in made]
     return tuple(made)
+
+
+def _on(robot: Robot, kept: Sequence[Keep]) -> list[Condition[Any, Any]]:
+    return [with_function(each, robot) for some in kept for each in some.conditions(robot)]
 
 
 def goal_kept(
@@ -78,8 +93,7 @@ def goal_kept(
         return goal
     if not isinstance(start, State) or start.free:
         return goal
-    ends = EndPoses(_poses(robot, start, "start"), _poses(robot, goal, "goal"))
-    rows = [with_function(x, robot) for each in kept for x in each.centered.conditions(robot, ends)]
+    rows = _on(robot, [each.centered for each in kept])
     q = goal_along(rows, robot, start.on(robot, "start")[0], goal, bounds)
     return goal if q is None else dataclasses.replace(goal, guess=q)
 

@@ -63,7 +63,7 @@ from hovi.robot.space.coordinates import Coordinates
 from hovi.scene.jerk_lagrangian import JerkLagrangian
 from hovi.scene.scene import Scene
 from hovi.scene.segment_scenes import SegmentScenes
-from hovi.scene.segmented_lagrangian import SegmentedLagrangian
+from hovi.scene.segmented_lagrangian import NODE_TOLERANCE, SegmentedLagrangian
 from hovi.schemes import require_regular
 from hovi.system.dataclass import dataclass
 
@@ -180,6 +180,11 @@ class TrajectoryProblem(ProblemSummary):
             v = jet[1] if len(jet) > 1 else v0
             name = f"the motion at t = {each.where.time:.4g} s"
             given[each.where.node] = NodeState(name, jet[0], v, free)
+        for each in self.along:  # which may share a node with another one
+            for node in np.searchsorted(
+                self.grid.t - NODE_TOLERANCE * self.grid.duration, each.during or ()
+            ).tolist():
+                given.setdefault(min(node, N), NodeState("", q0, v0, free))
         for hold in self.holds:
             name = f"the goal at t = {hold.time:.4g} s"
             given[hold.node] = NodeState(name, hold.q, hold.v, ~hold.fixed)
@@ -273,7 +278,8 @@ class TrajectoryProblem(ProblemSummary):
         ld = DiscreteLagrangian(clock.lagrangian(self.ld.lagrangian, now, lengths), grid)
         limits = None if self.limits is None else clock.limits(self.limits, now, lengths)
         via = clock.via(self.via, now, lengths)
-        return dataclasses.replace(self, ld=ld, limits=limits, via=via)
+        asked = clock.conditions(self.conditions, now, lengths)
+        return dataclasses.replace(self, ld=ld, limits=limits, via=via, conditions=asked)
 
     def _with(self, ld: DiscreteLagrangian) -> TrajectoryProblem:
         grid, T = ld.grid, self.grid.duration

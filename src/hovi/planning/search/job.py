@@ -183,7 +183,10 @@ class Job:
             return longer
         limits, ends = self.options.limits, clock.times(np.array(self.ends), now, lengths)
         fractions = (*(ends / longer.grid.duration).tolist(), 1.0)
-        changes: dict[str, Any] = {"via": clock.via(self.options.via, now, lengths)}
+        changes: dict[str, Any] = {
+            "via": clock.via(self.options.via, now, lengths),
+            "conditions": clock.conditions(self.options.conditions, now, lengths),
+        }
         if isinstance(limits, Limits):
             changes["limits"] = clock.limits(limits, now, lengths)
         own = zip(self.segments, fractions, strict=True)
@@ -292,8 +295,10 @@ def grid_of(T: float, options: PlanOptions, scene: Scene, free: bool) -> Grid:
 
 
 def stops_of(options: PlanOptions) -> list[float]:
-    """The times of via points and of conditions at given times, ascending, in [s]."""
-    return sorted({*(each.time for each in options.via), *times_of(options.conditions)})
+    """The times of via points and of conditions at given times or in parts, ascending, in [s]."""
+    parts = [t for each in options.conditions for t in each.during or () if t > 0]
+    via = (each.time for each in options.via)
+    return sorted({*via, *times_of(options.conditions), *parts})
 
 
 def _is_first_grid(grid: Grid, options: PlanOptions, order: int) -> bool:

@@ -40,9 +40,7 @@ from hovi.system.dataclass import dataclass
 
 if TYPE_CHECKING:
     from hovi.conditions.kept.keep import Keep
-    from hovi.discrete.state import State
     from hovi.planning.obstacles.grasped import Grasped
-    from hovi.planning.problem.frame_goal import FrameGoal
 
 DEFAULT_TOLERANCE = 1e-3
 """Relative tolerance of the cost if neither scheme, intervals nor tolerance are named."""
@@ -356,25 +354,6 @@ class PlanOptions:
         from hovi.planning.obstacles.grasped import scene_holding  # 10 ms
 
         return scene_holding(scene, tuple(self.grasped))
-
-    def keeping(
-        self,
-        robot: Robot,
-        start: State | FrameGoal,
-        goal: State | FrameGoal | None,
-        duration: float | tuple[float, float],
-    ) -> Self:
-        """These options with the conditions of what is kept between two ends.
-
-        Raises InputError as conditions_kept does, and for a condition that has a name twice.
-        """
-        if not self.keep:
-            return self
-        from hovi.conditions.kept.kinds import as_kept  # 10 ms
-        from hovi.planning.problem.kept_conditions import conditions_kept
-
-        kept = conditions_kept(as_kept(self.keep), robot, start, goal, duration)
-        return self.with_changes(keep=(), conditions=(*self.conditions, *kept))
 
     def aiming(self, scene: Scene) -> Scene:
         """The scene with the effects of the objective. Raises InputError as with_objective does."""

@@ -24,7 +24,7 @@ from hovi.planning.problem.clock import Clock
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.goals import Via
 from hovi.planning.problem.inverse_kinematics import position_bounds
-from hovi.planning.problem.kept_conditions import goal_kept
+from hovi.planning.problem.kept_conditions import conditions_kept, goal_kept, kept_between
 from hovi.planning.problem.notation.ends import End, as_end
 from hovi.planning.problem.notation.goal_turns import says_turns, turns_sentence
 from hovi.planning.problem.notation.smoothing import smoothed
@@ -161,9 +161,7 @@ def _planned(
     """
     began = time.perf_counter() if began is None else began
     if options.keep:
-        bounds = position_bounds(scene.robot, options.limits)
-        goal = goal_kept(as_kept(options.keep), scene.robot, start, goal, bounds)
-        options = options.keeping(scene.robot, start, goal, duration)
+        options, goal = _with_kept(options, scene.robot, start, goal, duration)
     given = start, goal
     chosen, apart = kept_apart(options.on(scene), scene.robot, ends_of(*given, options.via))
     deadline = Deadline(chosen.time_limit_seconds)
@@ -188,6 +186,23 @@ def _planned(
     reason = "" if search.ends is None else search.ends.reason
     found = infeasible_at_once(longest, chosen.guess, reason) if reason else search.run(began)
     return with_notes(found, [search.fine.scene], search.fine.options, apart)
+
+
+def _with_kept(
+    options: PlanOptions,
+    robot: Robot,
+    start: State | FrameGoal,
+    goal: State | FrameGoal,
+    duration: float | tuple[float, float],
+) -> tuple[PlanOptions, State | FrameGoal]:
+    """The options with the conditions of what is kept, and the goal to which a way along it leads.
+
+    Raises InputError as `kept_between` and `conditions_kept` do.
+    """
+    kept = kept_between(as_kept(options.keep), robot, start, goal)
+    goal = goal_kept(kept, robot, start, goal, position_bounds(robot, options.limits))
+    conditions = *options.conditions, *conditions_kept(kept, robot, start, duration)
+    return options.with_changes(keep=kept, conditions=conditions), goal
 
 
 def _says_the_same(job: Job, free: FreeDuration | None, reason: str) -> bool:

@@ -16,6 +16,8 @@ from hovi.checks.names import require_name
 from hovi.checks.shapes import numbers_of
 from hovi.checks.tables import entries_of
 from hovi.checks.units import DURATION_IN_WORDS, Duration, as_duration, seconds
+from hovi.conditions.kept.keep import Keep
+from hovi.conditions.kept.kinds import as_kept
 from hovi.discrete.state import State
 from hovi.effects import Effect
 from hovi.effects.registration import as_effects
@@ -34,7 +36,7 @@ _ONLY_AT_THE_END = ("a", "free_acceleration", "jerk", "free_jerk")
 """What the goal of the last segment alone may say."""
 
 
-@check_arguments_except("goal", "duration", "effects", "limits")
+@check_arguments_except("goal", "duration", "effects", "limits", "keep")
 @dataclass(frozen=True, eq=False)
 class Segment:
     """A segment of a sequence of motions, which `hovi.plan_sequence` plans together.
@@ -47,6 +49,8 @@ class Segment:
     effects: what acts in this segment besides the effects of the scene, such as the payload that is
         carried, also as tables by name; one of a kind that the scene has takes its place.
     limits: of this segment, as for `hovi.plan`; those of the options if None.
+    keep: what this segment keeps besides what the whole motion does, as for `hovi.plan`; what is
+        not said is taken from its own ends.
     name: in messages and reports.
     Raises InputError for a duration that is not positive, and for a goal or limits of another kind,
     SceneError for effects that are none.
@@ -57,12 +61,15 @@ class Segment:
     _: KW_ONLY
     effects: Sequence[Effect] = ()
     limits: str | Limits | Mapping[str, Any] | None = None
+    keep: Sequence[Keep | Mapping[str, Any]] = ()
     name: str = ""
 
     def __post_init__(self) -> None:
         require_name(self.name, "a segment")
         object.__setattr__(self, "duration", duration_of_segment(self.duration))
         object.__setattr__(self, "effects", as_effects(self.effects))
+        if not isinstance(self.keep, tuple) or self.keep:
+            object.__setattr__(self, "keep", as_kept(self.keep))
         if self.goal is not None and not isinstance(self.goal, State | FrameGoal | str | Mapping):
             numbers_of("the goal of a segment", self.goal)
         if self.limits is not None and not isinstance(self.limits, str | Limits | Mapping):

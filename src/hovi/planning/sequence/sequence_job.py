@@ -18,6 +18,7 @@ from hovi.planning.refinement.adaptive import MAX_FIRST_INTERVALS, first_grid
 from hovi.planning.search.job import Acting, Job, JobSegment, stops_of
 from hovi.planning.search.options import PlanOptions
 from hovi.planning.sequence.branches import End, MoveToGoal, chosen_branches
+from hovi.planning.sequence.kept_segments import kept_in_segments
 from hovi.planning.sequence.segment import Segment, names_of
 from hovi.planning.sequence.segment_findings import segment_findings
 from hovi.planning.sequence.segment_smoothing import smoothed_segments
@@ -56,6 +57,10 @@ def job_of(
     known, reached = chosen_branches(
         scene.robot, first.lagrangian(), begin, moves, options.clearance
     )
+    if options.keep or any(each.keep for each in segments):
+        kept = kept_in_segments(scene.robot, options.keep, segments, known, moves, reached)
+        asked, reached = (*options.conditions, *kept.conditions), list(kept.goals)
+        options = options.with_changes(keep=kept.whole, conditions=asked)
     moves = [
         dataclasses.replace(move, goal=goal) for move, goal in zip(moves, reached, strict=True)
     ]

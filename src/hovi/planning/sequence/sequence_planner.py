@@ -33,7 +33,6 @@ from hovi.planning.sequence.segment import (
     Segment,
     Table,
     checked_segments,
-    duration_of,
     durations_of,
     goals_of,
     names_of,
@@ -136,7 +135,6 @@ def plan_sequence(
     deadline = Deadline(chosen.time_limit_seconds)
     names = (f"the goal of {name!r}" for name in names_of(checked))
     stops = ends_of(begin, None, chosen.via) | dict(zip(names, goals, strict=True))
-    chosen = chosen.keeping(scene.robot, begin, goals[-1], duration_of(checked))
     chosen, apart = kept_apart(chosen.on(scene), scene.robot, stops)
     free = FreeSegments.of(durations_of(checked), chosen.time_weight)
     planned = partial(_planned, scene, begin, goals, checked, chosen, deadline, progress or silent)
@@ -190,6 +188,8 @@ def _alone(
         own = options.limits_on(acting, segment.limits)
         options = options.with_changes(limits=own.with_conditions_of(whole))
     assert segment.goal is not None
+    if segment.keep:
+        options = options.with_changes(keep=(*options.keep, *segment.keep))
     return plan(acting, start, segment.goal, segment.duration, progress, options)
 
 

@@ -11,6 +11,7 @@ conditions at every node they are as many as a curve has unknowns.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -26,8 +27,27 @@ from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.condition_outputs import add_curvature, jet_slopes
 
 Array = npt.NDArray[np.float64]
+Index = npt.NDArray[np.intp]
 
 _new_points = without_checks(Points)  # called at each step
+
+
+class _MomentsOf(NamedTuple):
+    """The moments of a batch of intervals, by its number, of which some are asked for.
+
+    part: which of the batch. intervals: their numbers in the grid. power: h^l of each.
+    """
+
+    batch: int
+    moments: IntervalMoments
+    part: slice | Index
+    intervals: Index | slice
+    power: Array
+
+    @property
+    def size(self) -> int:
+        """Number of moments of one value."""
+        return len(self.power) * len(self.moments.tests)
 
 
 class AlongMoments:
@@ -36,35 +56,38 @@ class AlongMoments:
     def __init__(self, problem: TrajectoryProblem, given: EquationAlong, size: Array) -> None:
         self._given, self._ld, self._size = given, problem.ld, size
         self._last: tuple[Sequence[Jet], dict[int, Array]] | None = None
-        self._parts = list[tuple[int, IntervalMoments, Array]]()
+        self._parts = list[_MomentsOf]()
+        holds, level = given.holds_in(problem.grid), given.where.level
         for i, batch in enumerate(problem.ld.interval_batches):
-            count, level = batch.modes + given.where.level, given.where.level
-            if count > 0:  # else the conditions at the nodes are all
-                moments = IntervalMoments.legendre(batch, count)
-                self._parts.append((i, moments, batch.h[:, None, None] ** level))
+            here = np.flatnonzero(holds[batch.index])
+            if batch.modes + level > 0 and len(here) > 0:  # else those at the nodes are all
+                whole = len(here) == len(batch.h)
+                part = slice(None) if whole else here
+                intervals = batch.index if whole else np.arange(len(holds))[batch.index][here]
+                moments = IntervalMoments.legendre(batch, batch.modes + level)
+                self._parts.append(_MomentsOf(i, moments, part, intervals, batch.h[part] ** level))
 
     @property
     def size(self) -> int:
         """Number of moments."""
-        counts = (len(each.batch.h) * len(each.tests) for _, each, _ in self._parts)
-        return self._given.y.size * sum(counts)
+        return self._given.y.size * sum(each.size for each in self._parts)
 
     def residual(self, jets: Sequence[Jet]) -> Array:
         """m_j, flat. jets: (q, v, a) at the quadrature points, per batch."""
         found = np.zeros(0)
-        for i, moments, power in self._parts:
+        for i, moments, part, _, power in self._parts:
             missed = self._size * self._given.on.missed(self._given.y.values(self._points(jets, i)))
-            found = np.append(found, power * moments.of(missed))
+            found = np.append(found, power[:, None, None] * moments.of(missed)[part])
         return found
 
     def rows(self, jets: Sequence[Jet], expansion: Expansion) -> list[ConstraintRows]:
         """Their derivatives in nodal columns, per batch. expansion: at the same path."""
         found = []
-        for i, moments, power in self._parts:
+        for i, moments, part, intervals, power in self._parts:
             own = self._size[:, None] * self._slopes(jets, i)
             slopes = moments.slopes(own, expansion.charts_of(i))
-            h = moments.batch.h[:, None, None]
-            found.append(ConstraintRows(moments.batch.index, slopes * (power / h)[..., None]))
+            factors = (power / moments.batch.h[part])[:, None, None, None]
+            found.append(ConstraintRows(intervals, slopes[part] * factors))
         return found
 
     def terms(self, jets: Sequence[Jet], multipliers: Array) -> Iterator[tuple[int, Array, Array]]:
@@ -73,9 +96,11 @@ class AlongMoments:
         The action of these terms is sum_j multipliers_j m_j. multipliers: flat, as `residual`.
         """
         first, size = 0, self._given.y.size
-        for i, moments, power in self._parts:
-            B, K = len(moments.batch.h), len(moments.tests)
-            mu = multipliers[first : first + B * K * size].reshape(B, K, size) * power
+        for i, moments, part, _, power in self._parts:
+            B, K = len(power), len(moments.tests)
+            mu = np.zeros((len(moments.batch.h), K, size))
+            own = multipliers[first : first + B * K * size].reshape(B, K, size)
+            mu[part] = own * power[:, None, None]
             first += B * K * size
             force = np.matmul(moments.tests.T, mu / moments.batch.h[:, None, None])
             force = force.reshape(-1, size) * self._size

@@ -55,11 +55,12 @@ class ConditionOutputs:
 
     def bounds(self, t: Array) -> Range:
         """Bounds of the outputs at times, (P, K) each."""
-        sides = [
-            [side / scale for side in each.on.at(t, each.y.size)]
-            for each, scale in zip(self.given, self._scales, strict=True)
-        ]
-        lower, upper = (np.concatenate(side, axis=1) for side in zip(*sides, strict=True))
+        parts = list[Range]()
+        for each, scale in zip(self.given, self._scales, strict=True):
+            low, high = (side / scale for side in each.on.at(t, each.y.size))
+            holds = each.holds_at(t)[:, None]
+            parts.append((np.where(holds, low, -np.inf), np.where(holds, high, np.inf)))
+        lower, upper = (np.concatenate(side, axis=1) for side in zip(*parts, strict=True))
         return lower, upper
 
     def values(self, at: Points) -> Array:

@@ -53,6 +53,7 @@ def json_schema() -> dict[str, Any]:
         "start": (StartTable | Bare, TaskTable.model_fields["start"]),
         "goal": (GoalTable | Bare | None, TaskTable.model_fields["goal"]),
         "obstacles": (list[_Entries] | _Entries, TaskTable.model_fields["obstacles"]),
+        "keep": (list[_Entries] | _Entries, TaskTable.model_fields["keep"]),
         "grasped": (list[GraspedTable] | GraspedTable, TaskTable.model_fields["grasped"]),
         "guess": (Literal["cubic", "minimum-jerk"], TaskTable.model_fields["guess"]),
         "tolerance": (

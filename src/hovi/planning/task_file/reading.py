@@ -43,6 +43,7 @@ from hovi.schemes import by_name
 from hovi.system.files import reason, require_file
 
 if TYPE_CHECKING:
+    from hovi.conditions.kept.keep import Keep
     from hovi.planning.obstacles.grasped import Grasped
 
 MAX_BYTES = 2_000_000
@@ -130,6 +131,7 @@ def _options(
         scheme=scheme.name,
         intervals=scheme.intervals,
         limits=read_limits(table.limits, robot, toml),
+        keep=_kept(table, robot, toml),
         obstacles=_obstacles(table, options, robot, toml),
         tolerance=tolerance,
         group=table.group,
@@ -170,6 +172,14 @@ def _obstacles(
             return read_obstacles(table.obstacles, options.clearance, robot, toml)
     except InputError as late:
         raise toml.error(("obstacles",), str(late)) from None
+
+
+def _kept(table: ShapedTable, robot: Robot, toml: TomlText) -> tuple[Keep, ...]:
+    if not table.keep:
+        return ()
+    from hovi.planning.task_file.keep_tables import read_kept  # most motions keep nothing
+
+    return read_kept(table.keep, robot, toml)
 
 
 def _grasped(table: ShapedTable, robot: Robot, toml: TomlText) -> tuple[tuple[Grasped, ...], Robot]:

@@ -207,6 +207,9 @@ class SegmentTable(Table):
     limits: Any = Field(
         default=None, description='"urdf", "soft", "none", the name of an arm or a table of limits'
     )
+    keep: Annotated[list[dict[str, Any]], BeforeValidator(_listed)] = Field(
+        default=[], description="tables [[segments.keep]] with a kind each"
+    )
     effects: dict[str, dict[str, Any]] = Field(default={}, description="tables of effects")
 
 
@@ -301,6 +304,9 @@ class ShapedTable(Table):
     grasped: Annotated[list[GraspedTable], BeforeValidator(_listed)] = Field(
         default=[],
         description="tables [[grasped]], or one table [grasped], with frame, mass and shape",
+    )
+    keep: Annotated[list[dict[str, Any]], BeforeValidator(_listed)] = Field(
+        default=[], description="tables [[keep]], or one table [keep], with a kind each"
     )
     start: Start = Field(description=_END.format("[start]"))
     goal: Goal = Field(default=None, description=_END.format("[goal]"))

@@ -16,6 +16,7 @@ from hovi.planning.sequence.segment import (
 )
 from hovi.planning.task_file.effect_tables import effect_table, read_effects
 from hovi.planning.task_file.goal_tables import NO_GROUP, Begin, end_table, read_end
+from hovi.planning.task_file.keep_tables import keep_table, read_kept
 from hovi.planning.task_file.limit_tables import limits_value, read_limits
 from hovi.planning.task_file.messages import TomlText
 from hovi.planning.task_file.schema import SegmentTable, ShapedTable, TaskTable
@@ -61,6 +62,7 @@ def _read_segment(
         duration,
         effects=read_effects(table.effects, robot, toml, keys),
         limits=None if limits is None else read_limits(limits, robot, toml, (*keys, "limits")),
+        keep=read_kept(table.keep, robot, toml, keys),
         name=table.name,
     )
 
@@ -80,6 +82,8 @@ def _segment_table(segment: Segment, name: str, robot: Robot) -> dict[str, Any]:
         table["limits"] = limits_value(segment.limits, robot)
     if segment.goal is not None:
         table["goal"] = end_table(as_end(segment.goal, robot, name), robot, name)
+    if segment.keep:
+        table["keep"] = [keep_table(each) for each in segment.keep]
     if segment.effects:
         table["effects"] = {each.key: effect_table(each) for each in segment.effects}
     return table

@@ -16,6 +16,7 @@ from hovi.planning.search.option_fields import option_infos
 from hovi.planning.search.options import PlanOptions
 from hovi.planning.task_file.effect_tables import effect_table
 from hovi.planning.task_file.goal_tables import end_table, via_table
+from hovi.planning.task_file.keep_tables import keep_table
 from hovi.planning.task_file.limit_tables import limits_value
 from hovi.planning.task_file.obstacle_tables import obstacle_table
 from hovi.planning.task_file.schema import FORMAT, PLAIN
@@ -27,7 +28,7 @@ from hovi.robot.srdf import read_srdf_file
 from hovi.schemes import by_name
 from hovi.system.files import make_folders, reason, whole_file
 
-_TABLES = ("limits", "start", "goal", "segments", "via", "obstacles", "grasped", "scheme")
+_TABLES = ("limits", "start", "goal", "segments", "via", "keep", "obstacles", "grasped", "scheme")
 """Keys that may hold tables, in the order in which the tables are written."""
 _EMPTY: tuple[Any, ...] = (None, [])
 
@@ -116,6 +117,7 @@ def _option_keys(task: Task, folder: Path) -> dict[str, Any]:
         "limits": limits_value(options.limits, robot),
         "tolerance": as_number_or_text(options.tolerance),
         "via": [via_table(each, robot) for each in options.via],
+        "keep": [keep_table(each) for each in options.keep],
         "obstacles": [obstacle_table(each, folder) for each in options.obstacles],
         "grasped": [each.to_dict() for each in options.grasped],
         "scheme": _scheme_table(options),

@@ -27,6 +27,8 @@ def violated_at_end(problem: TrajectoryProblem) -> str:
     for end, name in enumerate(("start", "goal")):
         box = _box(problem, end)
         for each in problem.bounds:
+            if not each.holds_in(problem.grid)[-end]:
+                continue
             sentence = _outside(each, box, name)
             if sentence:
                 return sentence

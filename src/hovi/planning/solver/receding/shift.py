@@ -115,6 +115,9 @@ class Shift:
     def _later(self, given: Condition[Any, Any]) -> Condition[Any, Any] | None:
         """A condition with its times by the new clock; None where all of them have passed."""
         later = given.from_time(self.elapsed)
+        if later.during is not None:
+            begin, end = (t * self._ratio for t in later.during)
+            return dataclasses.replace(later, during=(begin, end)) if end > 0 else None
         if not isinstance(given.where, AtTimes):
             return later
         left = [(time - self.elapsed) * self._ratio for time in self._left(times_of([given]))]
