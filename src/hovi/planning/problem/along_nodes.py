@@ -41,7 +41,8 @@ INDEPENDENT = 1e-6
 class NodeState:
     """What is given at a node.
 
-    name: of the node, in messages; "" for a node of which nothing is known. q, v: there, (nq,) and (nv,); what is free has some value.
+    name: of the node, in messages; "" where nothing is known. q, v: there, (nq,) and (nv,); what is
+        free has some value.
     free: which components of q, in the tangent space, and of v are free, (2, nv).
     """
 

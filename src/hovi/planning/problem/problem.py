@@ -63,7 +63,7 @@ from hovi.robot.space.coordinates import Coordinates
 from hovi.scene.jerk_lagrangian import JerkLagrangian
 from hovi.scene.scene import Scene
 from hovi.scene.segment_scenes import SegmentScenes
-from hovi.scene.segmented_lagrangian import NODE_TOLERANCE, SegmentedLagrangian
+from hovi.scene.segmented_lagrangian import SegmentedLagrangian
 from hovi.schemes import require_regular
 from hovi.system.dataclass import dataclass
 
@@ -180,11 +180,9 @@ class TrajectoryProblem(ProblemSummary):
             v = jet[1] if len(jet) > 1 else v0
             name = f"the motion at t = {each.where.time:.4g} s"
             given[each.where.node] = NodeState(name, jet[0], v, free)
-        for each in self.along:  # which may share a node with another one
-            for node in np.searchsorted(
-                self.grid.t - NODE_TOLERANCE * self.grid.duration, each.during or ()
-            ).tolist():
-                given.setdefault(min(node, N), NodeState("", q0, v0, free))
+        for time in {t for part in self.along for t in part.during or ()}:
+            node = int(np.argmin(np.abs(self.grid.t - time)))  # where two of them may meet
+            given.setdefault(node, NodeState("", q0, v0, free))
         for hold in self.holds:
             name = f"the goal at t = {hold.time:.4g} s"
             given[hold.node] = NodeState(name, hold.q, hold.v, ~hold.fixed)
