@@ -407,6 +407,7 @@ class BoundedAction(BoundedObjective[DiscretePath]):
             problem, own.algebra, multipliers=own.multipliers, keep_points=own.keep_points
         )
         other.ld, other.lagrangian = other.action.ld, other.action.lagrangian
+        other.more = None if self.more is None else ConditionOutputs(problem)
         lower, upper, weights = self._at_points
         at_points = steps[np.concatenate(self.ld.point_intervals)]
         other._at_points = lower, upper, at_points[:, None] * weights

@@ -14,6 +14,7 @@ from hovi.optimize.criteria import MAX_ITERATIONS, Criteria
 from hovi.optimize.ended import Ended, Reason
 from hovi.optimize.start import Start
 from hovi.optimize.trust_region import minimize
+from hovi.planning.problem.along_nodes import Rows
 from hovi.planning.problem.clock import SAME_LENGTH, Clock
 from hovi.planning.problem.contradictions import contradiction
 from hovi.planning.problem.limits import Limits, no_limits
@@ -58,7 +59,10 @@ def solves_jointly(problem: TrajectoryProblem, clock: Clock, lengths: Array, nea
     if limits is not None and (limits.on_torque_rate or limits.excused):
         return False
     nodes = clock.nodes(problem.grid, lengths)
-    if not all(_stays(each, problem.grid, nodes) for each in equations):
+    asked = [each for each in equations if not isinstance(each.y, Rows)]  # those along come next
+    if not all(_stays(each, problem.grid, nodes) for each in asked):
+        return False
+    if problem.along and not _scales(problem, nodes):
         return False
     if distances is not None and (distances.paths or problem.ld.chart is not None):
         return False
@@ -71,6 +75,24 @@ def _stays(equation: Equation, grid: Grid, nodes: Index) -> bool:
     inside = ((nodes[:, 0] < node) & (node < nodes[:, 1])).any()
     moves = node in (0, grid.intervals) and node in nodes  # velocities there change with L
     return not inside and not (moves and equation.y.needs - {"q"})
+
+
+def _scales(problem: TrajectoryProblem, nodes: Index) -> bool:
+    """Whether equations along a motion do not change with lengths of parts, (p, 2) nodes.
+
+    Those of positions do not while the columns (q, h v, ...) of the intervals are kept, which they
+    are where a motion rests at both ends of each part.
+    """
+    if any(each.where.level > 0 or each.timed for each in problem.along):
+        return False
+    N, rests = problem.grid.intervals, set[int]()
+    for hold in problem.holds:
+        if hold.fixed[1].all() and not hold.v.any():
+            rests.add(hold.node)
+    for end, node in enumerate((0, N)):
+        if not problem.free_ends[end, 1].any() and not problem.ends[1][end].any():
+            rests.add(node)
+    return set(nodes.ravel().tolist()) <= rests
 
 
 def solve_jointly(

@@ -36,8 +36,8 @@ def stretched_problem(
 ) -> TrajectoryProblem:
     """The problem for other lengths of its free parts, for the steps of solvers: it is not checked.
 
-    Only the discrete Lagrangian is that of the new lengths: times of via points, seams and limits
-    stay those of the old ones, and no solver reads them. The structure of the Hessian depends on
+    Only the discrete Lagrangian is that of the new lengths, and the parts in which conditions hold:
+    times of via points, seams and limits stay those of the old ones, and no solver reads them. The structure of the Hessian depends on
     the proportions of the steps alone.
     """
     if np.array_equal(lengths, now):
@@ -47,6 +47,10 @@ def stretched_problem(
     ld = _new_lagrangian(lagrangian, _new_grid(steps, problem.grid.schemes))
     stretched = copy.copy(problem)
     object.__setattr__(stretched, "ld", ld)
+    if any(each.during for each in problem.conditions):
+        for name in ("conditions", "along"):
+            moved = clock.conditions(getattr(problem, name), now, lengths)
+            object.__setattr__(stretched, name, moved)
     for name in ("torque_moments", "finer", "inertial_torque", "structure"):
         stretched.__dict__.pop(name, None)
     if clock.whole:  # the proportions stay
