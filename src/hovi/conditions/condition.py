@@ -84,7 +84,11 @@ class Condition(Generic[Values, Place]):
             )
         timed = isinstance(self.where, AtTimes) and self.tolerance != TOLERANCE
         if self.during is not None:
-            _require_part(self)
+            require_part(self.during, f"condition {self.name!r}")
+            if isinstance(self.where, AtTimes):
+                raise InputError(
+                    f"condition {self.name!r} is asked at given times: leave its `during` out."
+                )
         if isinstance(self.on, Equal) and (self.scale is not None or timed):
             raise InputError(
                 f"condition {self.name!r} has a value: leave its `scale` out, which is that of "
@@ -146,20 +150,16 @@ def _require_place(given: Condition[Any, Any]) -> None:
         )
 
 
-def _require_part(given: Condition[Any, Any]) -> None:
-    """Raise InputError for a part of a motion that is none, and for times in a part."""
+def require_part(during: Any, subject: str) -> None:
+    """Raise InputError for a part of a motion that is none. subject: whose it is, in messages."""
     try:
-        begin, end = (float(t) for t in given.during or ())
+        begin, end = (float(t) for t in during)
     except (TypeError, ValueError):
         begin = end = np.nan
     if not (np.isfinite([begin, end]).all() and begin < end):
         raise InputError(
-            f"`during` of condition {given.name!r} must be (begin, end) in [s], two ascending "
-            f"times, got {given.during!r}."
-        )
-    if isinstance(given.where, AtTimes):
-        raise InputError(
-            f"condition {given.name!r} is asked at given times: leave its `during` out."
+            f"`during` of {subject} must be (begin, end) in [s], two ascending times, got "
+            f"{during!r:.200}."
         )
 
 

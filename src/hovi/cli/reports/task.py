@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 def describe_task(task: Task) -> str:
     """Describe the boundary states, the scheme, the scene and the robot of a task."""
     from hovi.cli.reports.arm_limits import limit_set_of, source_lines
+    from hovi.conditions.kept.kinds import as_kept
     from hovi.planning.problem.notation.objective import describe_objective
     from hovi.planning.problem.tolerance import as_number_or_text
 
@@ -38,6 +39,7 @@ def describe_task(task: Task) -> str:
         lines += [f"limits of a {arm.title}, published in", *source_lines(arm)]
     for each in options.grasped:
         lines.append(f"holds {each.name!r}, {each.mass:g} kg, at {each.frame!r}")
+    lines += [f"keeps {each.describe()}" for each in as_kept(options.keep)]
     lines += _kept_from(task)
     lines += _end(task.start, "start", robot)
     lines += _segments(task) if task.segments else _end(task.goal, "goal", robot)
@@ -49,6 +51,7 @@ def describe_task(task: Task) -> str:
 def _segments(task: Task) -> list[str]:
     """The segments: when they end, where, and what is theirs alone."""
     from hovi.checks.units import in_words
+    from hovi.conditions.kept.kinds import as_kept
     from hovi.planning.problem.notation.ends import as_end
     from hovi.planning.sequence.segment import duration_of_segment, names_of
 
@@ -61,6 +64,7 @@ def _segments(task: Task) -> list[str]:
             line += f", from {begin:g} to {end:g} s"
         lines.append(line)
         own = [effect.describe() for effect in each.effects]
+        own += [f"keeps {kept.describe()}" for kept in as_kept(each.keep)]
         if each.limits is not None:
             own.append(f"limits {_limits(each.limits)}")
         where = ["goal: none, where the best motion passes"]

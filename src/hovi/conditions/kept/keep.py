@@ -16,7 +16,7 @@ from hovi.checks.directions import unit_vector
 from hovi.checks.names import require_name
 from hovi.checks.shapes import numbers_of
 from hovi.checks.units import angle, length
-from hovi.conditions.condition import Condition
+from hovi.conditions.condition import Condition, require_part
 from hovi.conditions.sets import Between, Equal
 from hovi.dynamics.symbolic_dynamics import casadi_functions
 from hovi.errors import InputError
@@ -56,9 +56,11 @@ class Keep(ABC):
     """What a motion keeps all along; the fields of the dataclass are keys in scene files.
 
     name: in messages and margins; by default what it is and of which frame.
+    during: (begin, end) in [s], the part of the motion in which it is kept; all of it if None.
     """
 
     name: str = field(default="", kw_only=True)
+    during: tuple[float, float] | None = field(default=None, kw_only=True)
     kind: ClassVar[str]
     """Its kind in scene files."""
 
@@ -67,6 +69,8 @@ class Keep(ABC):
         """Raise InputError for a field of another type, and as `check_values`."""
         check_fields(self, self.subject, InputError)
         require_name(self.name, "a condition")
+        if self.during is not None:
+            require_part(self.during, self.subject)
         self.check_values()
 
     @abstractmethod
@@ -103,6 +107,12 @@ class Keep(ABC):
     def subject(self) -> str:
         """What it is called in messages, such as "keep 'upright tool0'"."""
         return f"keep {self.title!r}"
+
+    def describe(self) -> str:
+        """One line for the description of a task: what it is, and what is said of it."""
+        said = {k: v for k, v in self.to_dict().items() if k not in ("kind", "name")}
+        own = ", ".join(f"{key} {value}" for key, value in said.items())
+        return f"{self.title}: {own}"
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON-able data, with the keys of a scene file."""

@@ -74,7 +74,9 @@ def conditions_kept(
 
 
 def _on(robot: Robot, kept: Sequence[Keep]) -> list[Condition[Any, Any]]:
-    return [with_function(each, robot) for some in kept for each in some.conditions(robot)]
+    parts = [(each, x.during) for x in kept for each in x.conditions(robot)]
+    made = [dataclasses.replace(each, during=during) for each, during in parts]
+    return [with_function(each, robot) for each in made]
 
 
 def goal_kept(
@@ -120,7 +122,8 @@ def _entered(
     each: Condition[Any, Any], robot: Robot, start: State, duration: float | tuple[float, float]
 ) -> Condition[Any, Any]:
     """An equation along a motion that begins where the start is; others as they are."""
-    if not isinstance(each.where, Along) or each.where.level > 1:
+    later = each.during is not None and each.during[0] > 0
+    if later or not isinstance(each.where, Along) or each.where.level > 1:
         return each
     given, (q, v) = cast(EquationAlong, each), start.on(robot, "start")[:2]
     gap = _gap(given, q, v)

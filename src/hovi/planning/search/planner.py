@@ -12,7 +12,7 @@ import numpy as np
 
 from hovi.checks.arguments import check_arguments_except
 from hovi.checks.units import Duration, as_duration
-from hovi.conditions.kept.kinds import as_kept
+from hovi.conditions.kept.kinds import KINDS, as_kept
 from hovi.discrete.output.caution import COLLISION, LEFT_OUT, STATUS, WARNED, Caution
 from hovi.discrete.state import State, warn_of_degrees
 from hovi.discrete.trajectory import Trajectory
@@ -31,6 +31,7 @@ from hovi.planning.problem.notation.smoothing import smoothed
 from hovi.planning.problem.presolve.assumptions import assumptions
 from hovi.planning.problem.presolve.findings import findings
 from hovi.planning.problem.presolve.length_slips import grasped_slips
+from hovi.planning.refinement.error_estimate import with_metadata
 from hovi.planning.refinement.faults.cautions import keeping_warnings, with_cautions_of_motion
 from hovi.planning.refinement.resolution import with_check
 from hovi.planning.search.branch_choice import Ends, chosen_ends, nearest_ends
@@ -233,8 +234,22 @@ def with_notes(
     cautions = notes if found.success else [Caution(STATUS, found.message), *notes]
     setup = found.setup_seconds if setup_seconds is None else setup_seconds
     message = " ".join([found.message, *said])
+    if options.keep:
+        found = dataclasses.replace(found, trajectory=_with_what_is_kept(found, options))
     found = dataclasses.replace(with_check(found), message=message, setup_seconds=setup)
     return with_cautions_of_motion(found, cautions)
+
+
+def _with_what_is_kept(found: Solution, options: PlanOptions) -> Trajectory:
+    """The motion, whose metadata say what it keeps, with the parts in which it does."""
+    asked = () if found.problem is None else found.problem.conditions
+    parts = {each.name: each.during for each in asked}
+    kept = [
+        dataclasses.replace(each, during=parts.get(each.title, each.during)).to_dict()
+        for each in as_kept(options.keep)
+        if each.kind in KINDS
+    ]
+    return with_metadata(found.trajectory, keep=kept)
 
 
 def _notes(found: Solution, scenes: Sequence[Scene], options: PlanOptions) -> Iterator[Caution]:

@@ -32,11 +32,11 @@ Conditions = tuple[Condition[Any, Any], ...]
 class KeptInSegments:
     """What a sequence keeps.
 
-    whole: all along. conditions: of all of it. goals: of the moves, with the guesses to which ways
-    along what is kept lead.
+    kept: all along and in segments. conditions: of all of it. goals: of the moves, with the guesses
+        to which ways along what is kept lead.
     """
 
-    whole: tuple[Keep, ...]
+    kept: tuple[Keep, ...]
     conditions: Conditions
     goals: tuple[End, ...]
 
@@ -55,6 +55,7 @@ def kept_in_segments(
     goals, of frames with the branches that were chosen for them. Raises InputError as
     `kept_between` and `conditions_kept` do.
     """
+    every = list[Keep]()
     always = kept_between(as_kept(whole), robot, begin, reached[-1])
     found = list(conditions_kept(always, robot, begin, moves[-1].end))
     names, starts = names_of(segments), np.cumsum([0.0, *(x.seconds for x in segments)]).tolist()
@@ -68,18 +69,20 @@ def kept_in_segments(
             start = before if number == 0 else None
             length = starts[number + 1] - starts[number]
             part = starts[number], starts[number + 1]
-            found += [
-                dataclasses.replace(each, name=f"{each.name} in {names[number]}", during=part)
-                for each in conditions_kept(kept, robot, start, length)
-            ]
+            kept = tuple(
+                dataclasses.replace(x, name=f"{x.title} in {names[number]}", during=part)
+                for x in kept
+            )
+            found += conditions_kept(kept, robot, start, length)
             along += kept
+            every += kept
         chosen = isinstance(move.goal, FrameGoal) and move.goal.guess is None
         if along and chosen and len(move.numbers) == 1:
             way = goal_kept(along, robot, before, move.goal, move.bounds)
             goal = way if isinstance(way, FrameGoal) and way.guess is not None else goal
         goals.append(goal)
         before = _as_start(goal)
-    return KeptInSegments(always, tuple(found), tuple(goals))
+    return KeptInSegments((*always, *every), tuple(found), tuple(goals))
 
 
 def _as_start(goal: End) -> End:

@@ -60,7 +60,7 @@ def job_of(
     if options.keep or any(each.keep for each in segments):
         kept = kept_in_segments(scene.robot, options.keep, segments, known, moves, reached)
         asked, reached = (*options.conditions, *kept.conditions), list(kept.goals)
-        options = options.with_changes(keep=kept.whole, conditions=asked)
+        options = options.with_changes(keep=kept.kept, conditions=asked)
     moves = [
         dataclasses.replace(move, goal=goal) for move, goal in zip(moves, reached, strict=True)
     ]

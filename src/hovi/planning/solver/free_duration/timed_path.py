@@ -37,8 +37,8 @@ def stretched_problem(
     """The problem for other lengths of its free parts, for the steps of solvers: it is not checked.
 
     Only the discrete Lagrangian is that of the new lengths, and the parts in which conditions hold:
-    times of via points, seams and limits stay those of the old ones, and no solver reads them. The structure of the Hessian depends on
-    the proportions of the steps alone.
+    times of via points, seams and limits stay those of the old ones, and no solver reads them. The
+    structure of the Hessian depends on the proportions of the steps alone.
     """
     if np.array_equal(lengths, now):
         return problem
