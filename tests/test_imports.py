@@ -11,7 +11,7 @@ import pytest
 
 import hovi
 
-SUBPACKAGES = {"accuracy", "effects", "schemes", "symbolic"}
+SUBPACKAGES = {"accuracy", "conditions", "effects", "schemes", "symbolic"}
 FIRST_PLAN = """
 import sys
 import hovi

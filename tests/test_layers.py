@@ -42,7 +42,7 @@ WITH_ORACLES = {
     "test_rules.py",
 }
 """Tests of what solvers are made of, by dense matrices and sampled curves, and the one door."""
-PUBLIC = {("accuracy",), ("effects",), ("schemes",), ("symbolic",)}
+PUBLIC = {("accuracy",), ("conditions",), ("effects",), ("schemes",), ("symbolic",)}
 
 
 def is_below(imported: Module, module: Module) -> bool:

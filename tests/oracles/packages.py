@@ -31,6 +31,7 @@ FLOORS = [
 # The folders inside a package, in the same order; "" stands for the files of the package itself.
 INSIDE = {
     "robot": [{"meshes"}, {"space", "urdf"}, {"findings"}, {"formats"}, {""}],
+    "conditions": [{""}, {"kept"}],
     "effects": [{"expressions"}, {""}],
     "discrete": [{"output"}, {""}, {"measures"}],
     "flows": [{""}, {"execution"}],

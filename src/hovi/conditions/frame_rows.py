@@ -12,12 +12,12 @@ import numpy.typing as npt
 Array = npt.NDArray[np.float64]
 
 
-def rotation_rows(R: ca.SX, target: Array) -> ca.SX:
+def rotation_rows(R: ca.SX, target: Array | ca.SX) -> ca.SX:
     """sin(theta) u = sum_i R*_i x R_i / 2 over the columns, for a turn by theta about u, (3,).
 
     R: of the frame in the world, (3, 3). target: R*, (3, 3).
     """
-    wanted = ca.DM(np.asarray(target))
+    wanted = target if isinstance(target, ca.SX) else ca.DM(np.asarray(target))
     turns = [ca.cross(wanted[:, i], R[:, i]) for i in range(3)]
     return (turns[0] + turns[1] + turns[2]) / 2
 

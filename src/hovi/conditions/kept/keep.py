@@ -152,11 +152,11 @@ class KeepFrame(Keep):
             raise InputError(f"the `{name}` of {self.subject} has length zero; give a direction.")
         return unit_vector(vector)
 
-    def _point(self, given: Any, ends: EndPoses) -> list[float]:
+    def _point(self, given: Any, ends: EndPoses, name: str = "point") -> list[float]:
         """A given point, or where the frame is at the start, (3,). Raises InputError."""
-        p = ends.start(self.frame).position if given is None else self._vector("point", given)
+        p = ends.start(self.frame).position if given is None else self._vector(name, given)
         if p is None:
-            raise self._missing("point", "start")
+            raise self._missing(name, "start")
         return [float(x) for x in p]
 
     def _missing(self, name: str, end: str) -> InputError:

@@ -7,8 +7,10 @@ from dataclasses import MISSING, fields
 from typing import Any
 
 from hovi.checks.tables import entries_of
+from hovi.conditions.kept.follow import Follow
 from hovi.conditions.kept.keep import Keep
 from hovi.conditions.kept.keep_orientation import KeepOrientation
+from hovi.conditions.kept.keep_pose import KeepPose
 from hovi.conditions.kept.on_line import OnLine
 from hovi.conditions.kept.on_plane import OnPlane
 from hovi.conditions.kept.row import Formula
@@ -16,10 +18,8 @@ from hovi.conditions.kept.tool_speed import ToolAcceleration, ToolSpeed
 from hovi.conditions.kept.upright import Upright
 from hovi.errors import InputError, nearest
 
-KINDS: dict[str, type[Keep]] = {
-    each.kind: each
-    for each in (Upright, OnLine, OnPlane, KeepOrientation, ToolSpeed, ToolAcceleration, Formula)
-}
+_FRAMES = Upright, OnLine, OnPlane, KeepOrientation, KeepPose, Follow, ToolSpeed, ToolAcceleration
+KINDS: dict[str, type[Keep]] = {each.kind: each for each in (*_FRAMES, Formula)}
 """The classes that scene files name, by kind."""
 
 

@@ -85,18 +85,19 @@ def goal_kept(
     start: State | FrameGoal,
     goal: State | FrameGoal,
     bounds: tuple[Array, Array],
+    duration: float,
 ) -> State | FrameGoal:
     """The goal, with the guess to which a way from the start leads along what is kept, if any.
 
     What is kept within a distance or an angle is kept itself along this way. bounds: limits on
-    positions, (nv,) each.
+    positions, (nv,) each. duration: of the way, in [s], for what is kept at times.
     """
     if isinstance(goal, State) or goal.guess is not None:
         return goal
     if not isinstance(start, State) or start.free:
         return goal
     rows = _on(robot, [each.centered for each in kept])
-    q = goal_along(rows, robot, start.on(robot, "start")[0], goal, bounds)
+    q = goal_along(rows, robot, start.on(robot, "start")[0], goal, bounds, duration)
     return goal if q is None else dataclasses.replace(goal, guess=q)
 
 

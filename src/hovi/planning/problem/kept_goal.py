@@ -40,19 +40,21 @@ def goal_along(
     q: Array,
     goal: FrameGoal,
     bounds: tuple[Array, Array],
+    duration: float,
 ) -> Array | None:
     """The configuration (nq,) at the goal, or None where the way ends before it.
 
     kept: conditions of which those of positions with a value are kept. q: at the start, (nq,).
-    bounds: limits on positions, (nv,) each, within which the configuration has to be.
+    bounds: limits on positions, (nv,) each, within which the configuration has to be. duration: of
+        the way, in [s], for what is kept at times.
     """
-    wanted = [each for each in kept if each.where == Along(0) and "t" not in each.y.needs]
+    wanted = [each for each in kept if each.where == Along(0)]
     rows = [(each.y, np.asarray(each.on.value)) for each in wanted]
     rows.append((goal.difference(robot), np.zeros(())))
-    begun, _ = _missed(rows, robot, q)
+    begun, _ = _missed(rows, robot, q, 0.0)
     for s in np.linspace(0.0, 1.0, STEPS + 1)[1:]:
         for _ in range(NEWTON_STEPS):
-            missed, J = _missed(rows, robot, q)
+            missed, J = _missed(rows, robot, q, s * duration)
             residual = missed - (1.0 - s) * begun
             if np.abs(residual).max() <= REACHED:
                 break
@@ -64,8 +66,10 @@ def goal_along(
     return q if ((inside >= bounds[0]) & (inside <= bounds[1])).all() else None
 
 
-def _missed(rows: Sequence[tuple[Function, Array]], robot: Robot, q: Array) -> tuple[Array, Array]:
-    """Functions minus their values at a configuration, (K,), and the Jacobian, (K, nv)."""
-    parts = [(*linear(y, q, np.zeros(robot.nv)), value) for y, value in rows]
+def _missed(
+    rows: Sequence[tuple[Function, Array]], robot: Robot, q: Array, t: float
+) -> tuple[Array, Array]:
+    """Functions minus their values at a configuration and a time, (K,), and the Jacobian."""
+    parts = [(*linear(y, q, np.zeros(robot.nv), t), value) for y, value in rows]
     missed, J = [y - value for y, _, value in parts], [slopes[:, 0] for _, slopes, _ in parts]
     return np.concatenate(missed), np.concatenate(J)

@@ -201,7 +201,8 @@ def _with_kept(
     Raises InputError as `kept_between` and `conditions_kept` do.
     """
     kept = kept_between(as_kept(options.keep), robot, start, goal)
-    goal = goal_kept(kept, robot, start, goal, position_bounds(robot, options.limits))
+    bounds, longest = position_bounds(robot, options.limits), float(np.max(duration))
+    goal = goal_kept(kept, robot, start, goal, bounds, longest)
     conditions = *options.conditions, *conditions_kept(kept, robot, start, duration)
     return options.with_changes(keep=kept, conditions=conditions), goal
 

@@ -78,7 +78,7 @@ def kept_in_segments(
             every += kept
         chosen = isinstance(move.goal, FrameGoal) and move.goal.guess is None
         if along and chosen and len(move.numbers) == 1:
-            way = goal_kept(along, robot, before, move.goal, move.bounds)
+            way = goal_kept(along, robot, before, move.goal, move.bounds, move.end - move.begin)
             goal = way if isinstance(way, FrameGoal) and way.guess is not None else goal
         goals.append(goal)
         before = _as_start(goal)

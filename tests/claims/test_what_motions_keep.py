@@ -1,0 +1,340 @@
+"""What motions keep all along, judged by Pinocchio alone at 2,001 samples."""
+
+from __future__ import annotations
+
+import dataclasses
+from functools import cache
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+import pytest
+
+import hovi
+from hovi.conditions import (
+    CasadiRow,
+    Formula,
+    Keep,
+    KeepOrientation,
+    OnLine,
+    OnPlane,
+    ToolAcceleration,
+    ToolSpeed,
+    Upright,
+)
+
+Array = npt.NDArray[np.float64]
+FRAME, T = "tool0", 1.5
+START = np.array([0.0, -1.2, 1.5, -0.3, 0.5, 0.0])
+ASIDE = np.array([0.0, 0.3, 0.0])
+"""From the tool's place at the start to its goal, in [m]."""
+DOWN = [0.0, 0.0, 1.0], [0.0, 0.0, -1.0]
+SPEED = 0.25
+"""Largest speed of the tool in segments that limit it, in [m/s]."""
+
+
+@cache
+def scene() -> hovi.Scene:
+    return hovi.Scene(hovi.load_robot("ur5"), [hovi.effects.Gravity()])
+
+
+def begin() -> Array:
+    return scene().robot.frame_pose(FRAME, START)
+
+
+def planned(*kept: Keep | dict[str, Any], **options: Any) -> hovi.Solution:
+    goal = hovi.FrameGoal(FRAME, position=begin()[:3, 3] + ASIDE)
+    asked: dict[str, Any] = {"self_collision": False} | options
+    return hovi.plan(scene(), START, goal, T, keep=kept, **asked)
+
+
+def times(motion: hovi.Trajectory, part: tuple[float, float] | None = None) -> Array:
+    first, last = part or (0.0, motion.duration)
+    return np.linspace(first, last, 2001)
+
+
+def poses(motion: hovi.Trajectory, t: Array) -> Array:
+    """Of the tool, (M, 4, 4), by Pinocchio's forward kinematics."""
+    model, data, found = scene().robot.model, scene().robot.model.createData(), []
+    for q in motion.sample(t).q:
+        pin.framesForwardKinematics(model, data, q)
+        found.append(data.oMf[model.getFrameId(FRAME)].homogeneous.copy())
+    return np.array(found)
+
+
+def off_line(p: Array) -> float:
+    """Largest distance of points from the line between the first and the last of them."""
+    d = (p[-1] - p[0]) / np.linalg.norm(p[-1] - p[0])
+    away = p - p[0]
+    return float(np.linalg.norm(away - np.outer(away @ d, d), axis=1).max())
+
+
+def tilt(R: Array) -> float:
+    """Largest angle by which what pointed up at first does not, in [rad]."""
+    up = R @ (R[0].T @ [0.0, 0.0, 1.0])
+    chord = np.linalg.norm(up - [0.0, 0.0, 1.0], axis=1)
+    return float((2.0 * np.arcsin(chord / 2)).max())
+
+
+def turn(R: Array) -> float:
+    """Largest angle of a turn from the first rotation, in [rad]."""
+    return float(max(np.linalg.norm(pin.log3(R[0].T @ each)) for each in R))
+
+
+def rates(p: Array, t: Array, order: int = 1) -> Array:
+    """Sizes of the derivatives of positions by central differences."""
+    for _ in range(order):
+        p, t = (p[2:] - p[:-2]) / (t[2:] - t[:-2])[:, None], t[1:-1]
+    return np.linalg.norm(p, axis=1)
+
+
+@cache
+def kept(name: str) -> hovi.Solution:
+    return planned(*KEPT[name])
+
+
+KEPT: dict[str, tuple[Keep, ...]] = {
+    "line": (OnLine(FRAME),),
+    "tube": (OnLine(FRAME, within="5 mm"),),
+    "plane": (OnPlane(FRAME),),
+    "upright": (Upright(FRAME),),
+    "nearly upright": (Upright(FRAME, within="5 deg"),),
+    "line and upright": (OnLine(FRAME), Upright(FRAME)),
+    "orientation": (KeepOrientation(FRAME), OnLine(FRAME)),
+    "speed": (ToolSpeed(FRAME, "400 mm/s", "60 deg/s"), OnLine(FRAME)),
+    "acceleration": (ToolAcceleration(FRAME, 1.0), OnLine(FRAME)),
+}
+
+
+@pytest.mark.parametrize("name", KEPT)
+def test_what_is_kept_holds_between_nodes(name: str) -> None:
+    found = kept(name)
+    assert found.success, found.message
+    t = times(found.trajectory)
+    found_poses = poses(found.trajectory, t)
+    R, p = found_poses[:, :3, :3], found_poses[:, :3, 3]
+    assert np.allclose(p[-1], begin()[:3, 3] + ASIDE, atol=1e-9)
+    if OnLine in map(type, KEPT[name]):
+        room = 5e-3 * (1 + 1e-6) if name == "tube" else 1e-5
+        assert off_line(p) <= room
+    if name == "tube":
+        assert off_line(p) > 0.9 * room  # which the least effort uses
+    if name == "plane":
+        assert np.abs(p[:, 2] - p[0, 2]).max() <= 1e-5
+    if "upright" in name:
+        room = np.deg2rad(5.0) * (1 + 1e-6) if name == "nearly upright" else np.deg2rad(0.01)
+        assert tilt(R) <= room
+    if name == "orientation":
+        assert turn(R) <= np.deg2rad(0.01)
+    if name == "speed":
+        spin = rates(R.reshape(-1, 9), t) / np.sqrt(2.0)
+        assert rates(p, t).max() <= 0.4 * (1 + 1e-6)
+        assert spin.max() <= np.deg2rad(60.0) * (1 + 1e-6)
+    if name == "acceleration":
+        assert rates(p, t, 2).max() <= 1.0 + 1e-3  # as differences have it
+
+
+def test_keeping_more_costs_more() -> None:
+    assert kept("tube").cost < kept("line").cost < kept("line and upright").cost
+    assert kept("nearly upright").cost < kept("upright").cost
+    assert kept("line").cost < min(kept("speed").cost, kept("acceleration").cost)
+
+
+def test_a_wide_room_is_none_and_a_narrow_one_a_value() -> None:
+    free = planned(OnLine(FRAME))
+    wide = planned(OnLine(FRAME), Upright(FRAME, within=3.0))
+    assert np.isclose(free.cost, wide.cost, rtol=1e-3)
+    narrow = planned(OnLine(FRAME, within="0.05 mm"))
+    assert narrow.margins().missed["on line tool0"] <= 1e-5
+    assert np.isclose(free.cost, narrow.cost, rtol=1e-3)
+
+
+def test_margins_name_what_is_kept() -> None:
+    assert set(kept("line and upright").margins().missed) == {"on line tool0", "upright tool0"}
+    bounds = kept("speed").margins().conditions
+    assert set(bounds) == {"tool speed tool0", "tool speed tool0 (turn)"}
+    assert min(bounds.values()) >= -1e-6
+
+
+def test_what_is_not_said_is_taken_from_the_ends() -> None:
+    p, R = begin()[:3, 3], begin()[:3, :3]
+    q = pin.Quaternion(R)
+    said = planned(
+        OnLine(FRAME, direction=7.0 * ASIDE, point=p + 0.4 * ASIDE),
+        KeepOrientation(FRAME, quaternion_wxyz=[q.w, q.x, q.y, q.z]),
+    )
+    assert np.isclose(said.cost, kept("orientation").cost, rtol=1e-6)
+
+
+def test_an_axis_of_the_frame_is_kept_along_one_of_the_world() -> None:
+    R = begin()[:3, :3]
+    named = planned(Upright(FRAME, axis={"frame": R.T @ [0.0, 0.0, 2.0], "world": [0, 0, 5]}))
+    assert np.isclose(named.cost, kept("upright").cost, rtol=1e-6)
+
+
+def test_formulas_and_functions_are_the_same() -> None:
+    x = begin()[0, 3]
+
+    def aside(q: ca.SX) -> ca.SX:
+        return place(q)[1][0] - x
+
+    place = hovi.symbolic.rigid_body(scene()).frame_placement(FRAME)
+    formula = f'position["{FRAME}"][0]'
+    named = planned(Formula(formula, equals=x, unit="m", tolerance=1e-5))
+    own = planned(CasadiRow(aside, level=0, unit="m", tolerance=1e-5))
+    plane = planned(OnPlane(FRAME, normal=[1.0, 0.0, 0.0]))
+    assert np.allclose([named.cost, own.cost], plane.cost, rtol=1e-6)
+
+
+@pytest.mark.parametrize("axis", ["x_axis", "y_axis", "z_axis"])
+def test_axes_in_formulas_are_columns_of_the_rotation(axis: str) -> None:
+    column = begin()[:3, ["x_axis", "y_axis", "z_axis"].index(axis)]
+    met = Formula(f'{axis}["{FRAME}"]', lower=column - 0.7, upper=column + 0.7)
+    assert planned(met, OnLine(FRAME)).success
+    off = Formula(f'{axis}["{FRAME}", "y"]', lower=column[1] + 0.1)
+    refused = planned(off)
+    assert refused.status is hovi.Status.INFEASIBLE
+    assert "at the start, outside its bounds" in refused.message
+
+
+def test_a_start_that_misses_a_line_a_little_enters_it() -> None:
+    p = begin()[:3, 3] + [4e-4, 0.0, 0.0]
+    goal = hovi.FrameGoal(FRAME, position=p + ASIDE)
+    line = OnLine(FRAME, direction=ASIDE, point=p)
+    with pytest.warns(hovi.errors.HoviWarning, match=r"0.0004 m at the start.*within 0.3 s"):
+        found = hovi.plan(scene(), START, goal, T, keep=[line], self_collision=False)
+    assert found.success, found.message
+    assert any("enters it" in each for each in found.cautions)
+    away = np.abs(poses(found.trajectory, times(found.trajectory))[:, 0, 3] - p[0])
+    assert np.isclose(away[0], 4e-4, rtol=1e-6)
+    assert away.max() <= 4e-4 + 1e-5
+    assert away[times(found.trajectory) >= 0.3].max() <= 1e-5
+
+
+def test_a_start_that_misses_it_by_more_is_refused_with_the_gap() -> None:
+    line = OnLine(FRAME, direction=ASIDE, point=begin()[:3, 3] + [4e-3, 0.0, 0.0])
+    with pytest.raises(hovi.errors.InputError, match=r"missed by 0.004 m at the start, more than"):
+        planned(line)
+    near = OnLine(FRAME, direction=ASIDE, point=begin()[:3, 3] + [4e-4, 0.0, 0.0])
+    goal = hovi.FrameGoal(FRAME, position=begin()[:3, 3] + ASIDE)
+    with pytest.raises(hovi.errors.InputError, match="needs a given duration"):
+        hovi.plan(scene(), START, goal, (1.0, 2.0), keep=[near])
+
+
+def test_a_level_of_a_row_is_checked() -> None:
+    row = CasadiRow(lambda v: v[0] + v[1], level=0)
+    with pytest.raises(hovi.errors.InputError, match="says level 0, but its level is 1"):
+        planned(row)
+    bounded = CasadiRow(lambda q: q[0], level=0, upper=1.0)
+    with pytest.raises(hovi.errors.InputError, match="its level is none, with bounds"):
+        planned(bounded)
+
+
+def test_a_replan_keeps_it() -> None:
+    found = kept("line and upright")
+    start = found.trajectory.sample([0.3]).q[0]
+    goal = found.trajectory.q[-1]
+    again = found.replan(start, goal)
+    assert again.success, again.message
+    found_poses = poses(again.trajectory, times(again.trajectory))
+    assert off_line(found_poses[:, :3, 3]) <= 1e-5
+    assert tilt(found_poses[:, :3, :3]) <= np.deg2rad(0.02)
+
+
+def segments(lasting: float | tuple[float, float] | None = None) -> list[hovi.Segment]:
+    """To above a place, straight down to it, straight up again slowly, and home."""
+
+    def over(z: float) -> hovi.FrameGoal:
+        return hovi.FrameGoal(FRAME, position=[0.4, 0.2, z], axis=DOWN)
+
+    def seconds(T: float) -> float | tuple[float, float]:
+        return T if lasting is None else (0.5 * T, 2.0 * T)
+
+    lowered: list[Keep] = [OnLine(FRAME), Upright(FRAME, axis=DOWN)]
+    lifted: list[Keep] = [OnLine(FRAME), ToolSpeed(FRAME, SPEED)]
+    return [
+        hovi.Segment(over(0.3), seconds(1.0), name="above"),
+        hovi.Segment(over(0.2), seconds(0.6), name="down", keep=lowered),
+        hovi.Segment(over(0.3), seconds(0.6), name="up", keep=lifted),
+        hovi.Segment([0.0, -1.2, 1.5, -1.8, -1.57, 0.0], seconds(1.0), name="home"),
+    ]
+
+
+def require_kept(found: hovi.Solution) -> None:
+    """Straight down with the tool's axis, straight up no faster than SPEED, and neither before."""
+    assert found.success, found.message
+    assert found.problem is not None
+    first, second, third = found.problem.ld.lagrangian.ends
+    down = poses(found.trajectory, times(found.trajectory, (first, second)))
+    assert off_line(down[:, :3, 3]) <= 1e-5
+    assert np.abs(down[:, :3, 2] + [0.0, 0.0, 1.0]).max() <= np.deg2rad(0.01)
+    t = times(found.trajectory, (second, third))
+    up = poses(found.trajectory, t)[:, :3, 3]
+    assert off_line(up) <= 1e-5
+    assert rates(up, t).max() <= SPEED * (1 + 1e-6)
+    t = times(found.trajectory, (0.0, first))
+    before = poses(found.trajectory, t)[:, :3, 3]
+    assert off_line(before) > 1e-2
+    assert rates(before, t).max() > 2 * SPEED
+
+
+def sequence(**options: Any) -> hovi.Solution:
+    home = [0.0, -1.2, 1.5, -1.8, -1.57, 0.0]
+    asked: dict[str, Any] = {"self_collision": False} | options
+    return hovi.plan_sequence(scene(), home, asked.pop("segments", segments()), **asked)
+
+
+def test_segments_keep_what_is_theirs() -> None:
+    found = sequence()
+    require_kept(found)
+    said = {each["name"]: each["during"] for each in found.trajectory.metadata["keep"]}
+    assert np.allclose(said["on line tool0 in down"], [1.0, 1.6])
+
+
+def test_free_durations_of_segments_that_keep_something_are_solved_jointly() -> None:
+    found = sequence(segments=segments((0.5, 2.0)), time_weight=200.0)
+    require_kept(found)
+    assert found.problem is not None
+    ends = [0.0, *found.problem.ld.lagrangian.ends, found.trajectory.duration]
+    said = {each["name"]: each["during"] for each in found.trajectory.metadata["keep"]}
+    assert np.allclose(said["tool speed tool0 in up"], ends[2:4])
+    lasts = np.diff(ends)
+    for shift in (0.97, 1.03):  # no better with another length of the one that is not at a bound
+        other = [
+            dataclasses.replace(each, duration=float(T))
+            for each, T in zip(segments(), lasts * [1.0, 1.0, shift, 1.0], strict=True)
+        ]
+        near = sequence(segments=other)
+        assert near.cost + 200.0 * near.trajectory.duration > found.cost - 2e-3 * found.cost
+
+
+def test_the_whole_sequence_keeps_what_all_of_it_does() -> None:
+    found = sequence(keep=[Upright(FRAME, axis=DOWN, within="30 deg")])
+    require_kept(found)
+    R = poses(found.trajectory, times(found.trajectory))[:, :3, :3]
+    angle = np.arccos(np.clip(-R[:, 2, 2], -1.0, 1.0)).max()
+    assert angle <= np.deg2rad(30.0) * (1 + 1e-6)
+
+
+def test_a_part_of_a_motion_is_kept() -> None:
+    part = 0.5, 1.0
+    found = planned(OnPlane(FRAME, point=[0.0, 0.0, begin()[2, 3] - 0.02], during=part))
+    assert found.success, found.message
+    inside = poses(found.trajectory, times(found.trajectory, part))[:, 2, 3]
+    assert np.abs(inside - begin()[2, 3] + 0.02).max() <= 1e-5
+    whole = poses(found.trajectory, times(found.trajectory))[:, 2, 3]
+    assert np.isclose(whole[0], begin()[2, 3])
+    slow = planned(ToolSpeed(FRAME, 0.2, during=part))
+    t = times(slow.trajectory, part)
+    assert rates(poses(slow.trajectory, t)[:, :3, 3], t).max() <= 0.2 * (1 + 1e-6)
+    t = times(slow.trajectory, (0.0, 0.5))
+    assert rates(poses(slow.trajectory, t)[:, :3, 3], t).max() > 0.3
+
+
+def test_a_sum_along_the_way_of_parts_that_meet_is_asked_once() -> None:
+    halves = [OnPlane(FRAME, during=(0.0, 0.7)), OnPlane(FRAME, name="rest", during=(0.7, T))]
+    found = planned(*halves)
+    assert found.success, found.message
+    assert np.isclose(found.cost, kept("plane").cost, rtol=1e-3)
