@@ -28,6 +28,7 @@ import numpy as np
 
 import hovi
 from hard.verdict import Mutant, Verdict, judge
+from hovi.conditions.condition import with_function
 from hovi.discrete.output.stored_torque import StoredTorque
 from hovi.flows.legendre_transforms import legendre
 from hovi.robot.space.configuration_space import ConfigurationSpace
@@ -148,6 +149,7 @@ def calls() -> dict[str, Call]:
     groups = (
         _models,
         _scenes,
+        _kept,
         _grids,
         _motions,
         _problems,
@@ -298,6 +300,43 @@ def _scene_with(effect: Callable[..., Any]) -> Callable[..., hovi.Scene]:
         return hovi.Scene(robot(), [effect(**fields)])
 
     return with_effect
+
+
+def _kept() -> list[Call]:
+    c, few = hovi.conditions, {"name": "kept", "during": (0.2, 0.8)}
+    poses = {"times": [0.0, 0.5, 1.0], "positions": [[0.3, 0.0, 0.1 * i] for i in range(3)]}
+    found = [
+        build(c.Upright, frame="tip", axis=([0, 0, 1], [1, 0, 0]), within="5 deg", tolerance=1e-4),
+        build(c.OnLine, frame="tip", direction=[1, 0, 0], point=[0.3, 0, 0], within="5 mm", **few),
+        build(c.OnPlane, frame="tip", normal=[0, 0, 1], point=[0.3, 0, 0], tolerance="0.01 mm"),
+        build(c.KeepOrientation, frame="tip", rpy=[0.1, 0.2, 0.3], within=0.1, tolerance=1e-4),
+        build(c.KeepOrientation, frame="tip", quaternion_xyzw=[0, 0, 0, 1]),
+        build(c.KeepOrientation, frame="tip", quaternion_wxyz=[1, 0, 0, 0]),
+        build(c.KeepPose, frame="tip", axes=["x", "rz"], position=[0.3, 0, 0], rpy=[0, 0, 0]),
+        build(c.Follow, frame="tip", **poses, rpy=np.zeros((3, 3)), tolerance=1e-5, angle=1e-4),
+        build(c.ToolSpeed, frame="tip", linear="250 mm/s", angular=0.5),
+        build(c.ToolAcceleration, frame="tip", linear=2.0),
+        build(c.Formula, formula="q['elbow']", lower=-1.0, upper=1.0, scale=2.0, unit="rad"),
+        build(c.Formula, formula="v", equals=[0.1, 0.2], tolerance=1e-5),
+        build(c.CasadiRow, expression=lambda v: v[0] + v[1], level=1, equals=0.1, tolerance=1e-5),
+    ]
+    return [call(_conditions_of(each.function), **dict(each.keywords)) for each in found]
+
+
+def _conditions_of(kind: Callable[..., Any]) -> Callable[..., Any]:
+    """The conditions of what is kept on a robot, from one end of a motion to the other."""
+
+    @functools.wraps(kind)
+    def conditions(**given: Any) -> Any:
+        ends = hovi.conditions.EndPoses(_pose, _pose)
+        kept = kind(**given).resolved(ends)
+        return [with_function(each, robot()) for each in kept.conditions(robot())]
+
+    return conditions
+
+
+def _pose(frame: str) -> hovi.conditions.Pose:
+    return hovi.conditions.Pose(np.eye(3), np.array([0.3, 0.0, 0.1]))
 
 
 def _grids() -> list[Call]:

@@ -24,7 +24,7 @@ LEFT_OUT = {
     # needs an optional library, and has tests of its own
     "replay_in_mujoco",
     # packages, of which the members are called
-    *("accuracy", "effects", "schemes", "symbolic"),
+    *("accuracy", "conditions", "effects", "schemes", "symbolic"),
 }
 
 
@@ -51,6 +51,7 @@ def test_every_public_function_and_class_is_called() -> None:
     public = {name for name in dir(hovi) if not name.startswith("_")} - LEFT_OUT
     assert public <= called
     assert {each.__name__ for each in hovi.effects.REGISTRY.values()} - {"Jet"} <= called
+    assert set(hovi.conditions.__all__) - {"EndPoses", "Keep", "Pose"} <= called
     assert set(hovi.symbolic.__all__) - {"RigidBody"} <= called
 
 

@@ -144,10 +144,7 @@ def _spline(t: Array, x: Array) -> Callable[[ca.SX], ca.SX]:
 
 def _turned_rows(R: ca.SX, quaternion: ca.SX) -> ca.SX:
     """sin(theta) u of the turn from a quaternion (x, y, z, w) of any length to R, (3,)."""
-    x, y, z, w = ca.vertsplit(quaternion / ca.norm_2(quaternion))
-    wanted = ca.vertcat(
-        ca.horzcat(1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)),
-        ca.horzcat(2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)),
-        ca.horzcat(2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)),
-    )
-    return rotation_rows(R, wanted)
+    unit = quaternion / ca.norm_2(quaternion)
+    u, w = unit[:3], unit[3]
+    turned = u @ u.T + w * ca.skew(u)
+    return rotation_rows(R, (w**2 - ca.sumsqr(u)) * ca.SX.eye(3) + 2 * turned)

@@ -30,9 +30,9 @@ Placement = Callable[[ca.SX], tuple[ca.SX, ca.SX]]
 POSITION_TOLERANCE = 1e-5
 """By how much a position may miss its value between nodes, in [m]."""
 DIRECTION_TOLERANCE = float(np.deg2rad(0.01))
-"""The same for a direction, in [rad]."""
+"""By how much a direction may miss its value between nodes, in [rad]."""
 LEAST_ROOM = 10.0
-"""`within` in tolerances below which a value is kept instead: a range that is not much wider."""
+"""Room in tolerances below which a value is kept instead: a range that is not much wider."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -26,6 +26,7 @@ from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 UP = np.array([0.0, 0.0, 1.0])
+"""The direction in the world that is up."""
 
 
 @dataclass(frozen=True, eq=False)

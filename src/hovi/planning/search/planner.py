@@ -12,7 +12,6 @@ import numpy as np
 
 from hovi.checks.arguments import check_arguments_except
 from hovi.checks.units import Duration, as_duration
-from hovi.conditions.kept.kinds import KINDS, as_kept
 from hovi.discrete.output.caution import COLLISION, LEFT_OUT, STATUS, WARNED, Caution
 from hovi.discrete.state import State, warn_of_degrees
 from hovi.discrete.trajectory import Trajectory
@@ -23,15 +22,12 @@ from hovi.planning.clearance.self_collisions import not_looked_at, pairs_left_ou
 from hovi.planning.problem.clock import Clock
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.goals import Via
-from hovi.planning.problem.inverse_kinematics import position_bounds
-from hovi.planning.problem.kept_conditions import conditions_kept, goal_kept, kept_between
 from hovi.planning.problem.notation.ends import End, as_end
 from hovi.planning.problem.notation.goal_turns import says_turns, turns_sentence
 from hovi.planning.problem.notation.smoothing import smoothed
 from hovi.planning.problem.presolve.assumptions import assumptions
 from hovi.planning.problem.presolve.findings import findings
 from hovi.planning.problem.presolve.length_slips import grasped_slips
-from hovi.planning.refinement.error_estimate import with_metadata
 from hovi.planning.refinement.faults.cautions import keeping_warnings, with_cautions_of_motion
 from hovi.planning.refinement.resolution import with_check
 from hovi.planning.search.branch_choice import Ends, chosen_ends, nearest_ends
@@ -162,7 +158,9 @@ def _planned(
     """
     began = time.perf_counter() if began is None else began
     if options.keep:
-        options, goal = _with_kept(options, scene.robot, start, goal, duration)
+        from hovi.planning.search.kept import with_kept  # most motions keep nothing
+
+        options, goal = with_kept(options, scene.robot, start, goal, duration)
     given = start, goal
     chosen, apart = kept_apart(options.on(scene), scene.robot, ends_of(*given, options.via))
     deadline = Deadline(chosen.time_limit_seconds)
@@ -187,24 +185,6 @@ def _planned(
     reason = "" if search.ends is None else search.ends.reason
     found = infeasible_at_once(longest, chosen.guess, reason) if reason else search.run(began)
     return with_notes(found, [search.fine.scene], search.fine.options, apart)
-
-
-def _with_kept(
-    options: PlanOptions,
-    robot: Robot,
-    start: State | FrameGoal,
-    goal: State | FrameGoal,
-    duration: float | tuple[float, float],
-) -> tuple[PlanOptions, State | FrameGoal]:
-    """The options with the conditions of what is kept, and the goal to which a way along it leads.
-
-    Raises InputError as `kept_between` and `conditions_kept` do.
-    """
-    kept = kept_between(as_kept(options.keep), robot, start, goal)
-    bounds, longest = position_bounds(robot, options.limits), float(np.max(duration))
-    goal = goal_kept(kept, robot, start, goal, bounds, longest)
-    conditions = *options.conditions, *conditions_kept(kept, robot, start, duration)
-    return options.with_changes(keep=kept, conditions=conditions), goal
 
 
 def _says_the_same(job: Job, free: FreeDuration | None, reason: str) -> bool:
@@ -236,21 +216,11 @@ def with_notes(
     setup = found.setup_seconds if setup_seconds is None else setup_seconds
     message = " ".join([found.message, *said])
     if options.keep:
-        found = dataclasses.replace(found, trajectory=_with_what_is_kept(found, options))
+        from hovi.planning.search.kept import saying_what_is_kept
+
+        found = dataclasses.replace(found, trajectory=saying_what_is_kept(found, options))
     found = dataclasses.replace(with_check(found), message=message, setup_seconds=setup)
     return with_cautions_of_motion(found, cautions)
-
-
-def _with_what_is_kept(found: Solution, options: PlanOptions) -> Trajectory:
-    """The motion, whose metadata say what it keeps, with the parts in which it does."""
-    asked = () if found.problem is None else found.problem.conditions
-    parts = {each.name: each.during for each in asked}
-    kept = [
-        dataclasses.replace(each, during=parts.get(each.title, each.during)).to_dict()
-        for each in as_kept(options.keep)
-        if each.kind in KINDS
-    ]
-    return with_metadata(found.trajectory, keep=kept)
 
 
 def _notes(found: Solution, scenes: Sequence[Scene], options: PlanOptions) -> Iterator[Caution]:

@@ -6,7 +6,7 @@ import dataclasses
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import KW_ONLY, fields
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,8 +16,6 @@ from hovi.checks.names import require_name
 from hovi.checks.shapes import numbers_of
 from hovi.checks.tables import entries_of
 from hovi.checks.units import DURATION_IN_WORDS, Duration, as_duration, seconds
-from hovi.conditions.kept.keep import Keep
-from hovi.conditions.kept.kinds import as_kept
 from hovi.discrete.state import State
 from hovi.effects import Effect
 from hovi.effects.registration import as_effects
@@ -29,6 +27,9 @@ from hovi.planning.search.job import stops_of
 from hovi.planning.search.options import PlanOptions
 from hovi.robot.robot import Robot
 from hovi.system.dataclass import dataclass
+
+if TYPE_CHECKING:
+    from hovi.conditions.kept.keep import Keep
 
 MAX_SEGMENTS = 1000
 """Largest number of segments of a sequence."""
@@ -69,6 +70,8 @@ class Segment:
         object.__setattr__(self, "duration", duration_of_segment(self.duration))
         object.__setattr__(self, "effects", as_effects(self.effects))
         if not isinstance(self.keep, tuple) or self.keep:
+            from hovi.conditions.kept.kinds import as_kept  # most segments keep nothing
+
             object.__setattr__(self, "keep", as_kept(self.keep))
         if self.goal is not None and not isinstance(self.goal, State | FrameGoal | str | Mapping):
             numbers_of("the goal of a segment", self.goal)

@@ -18,7 +18,6 @@ from hovi.planning.refinement.adaptive import MAX_FIRST_INTERVALS, first_grid
 from hovi.planning.search.job import Acting, Job, JobSegment, stops_of
 from hovi.planning.search.options import PlanOptions
 from hovi.planning.sequence.branches import End, MoveToGoal, chosen_branches
-from hovi.planning.sequence.kept_segments import kept_in_segments
 from hovi.planning.sequence.segment import Segment, names_of
 from hovi.planning.sequence.segment_findings import segment_findings
 from hovi.planning.sequence.segment_smoothing import smoothed_segments
@@ -58,6 +57,8 @@ def job_of(
         scene.robot, first.lagrangian(), begin, moves, options.clearance
     )
     if options.keep or any(each.keep for each in segments):
+        from hovi.planning.sequence.kept_segments import kept_in_segments  # most keep nothing
+
         kept = kept_in_segments(scene.robot, options.keep, segments, known, moves, reached)
         asked, reached = (*options.conditions, *kept.conditions), list(kept.goals)
         options = options.with_changes(keep=kept.kept, conditions=asked)

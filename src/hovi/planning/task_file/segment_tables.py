@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from hovi.errors import InputError
 from hovi.planning.problem.notation.ends import as_end
@@ -16,11 +16,13 @@ from hovi.planning.sequence.segment import (
 )
 from hovi.planning.task_file.effect_tables import effect_table, read_effects
 from hovi.planning.task_file.goal_tables import NO_GROUP, Begin, end_table, read_end
-from hovi.planning.task_file.keep_tables import keep_table, read_kept
 from hovi.planning.task_file.limit_tables import limits_value, read_limits
 from hovi.planning.task_file.messages import TomlText
 from hovi.planning.task_file.schema import SegmentTable, ShapedTable, TaskTable
 from hovi.robot.robot import Robot
+
+if TYPE_CHECKING:
+    from hovi.conditions.kept.keep import Keep
 
 
 def check_keys(table: ShapedTable, toml: TomlText) -> None:
@@ -62,9 +64,17 @@ def _read_segment(
         duration,
         effects=read_effects(table.effects, robot, toml, keys),
         limits=None if limits is None else read_limits(limits, robot, toml, (*keys, "limits")),
-        keep=read_kept(table.keep, robot, toml, keys),
+        keep=_kept(table, robot, toml, number),
         name=table.name,
     )
+
+
+def _kept(table: SegmentTable, robot: Robot, toml: TomlText, number: int) -> tuple[Keep, ...]:
+    if not table.keep:
+        return ()
+    from hovi.planning.task_file.keep_tables import read_kept  # most segments keep nothing
+
+    return read_kept(table.keep, robot, toml, ("segments", number))
 
 
 def segments_value(segments: Sequence[Segment], robot: Robot) -> list[dict[str, Any]]:
@@ -83,6 +93,8 @@ def _segment_table(segment: Segment, name: str, robot: Robot) -> dict[str, Any]:
     if segment.goal is not None:
         table["goal"] = end_table(as_end(segment.goal, robot, name), robot, name)
     if segment.keep:
+        from hovi.planning.task_file.keep_tables import keep_table
+
         table["keep"] = [keep_table(each) for each in segment.keep]
     if segment.effects:
         table["effects"] = {each.key: effect_table(each) for each in segment.effects}

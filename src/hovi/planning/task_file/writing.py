@@ -16,7 +16,6 @@ from hovi.planning.search.option_fields import option_infos
 from hovi.planning.search.options import PlanOptions
 from hovi.planning.task_file.effect_tables import effect_table
 from hovi.planning.task_file.goal_tables import end_table, via_table
-from hovi.planning.task_file.keep_tables import keep_table
 from hovi.planning.task_file.limit_tables import limits_value
 from hovi.planning.task_file.obstacle_tables import obstacle_table
 from hovi.planning.task_file.schema import FORMAT, PLAIN
@@ -117,7 +116,7 @@ def _option_keys(task: Task, folder: Path) -> dict[str, Any]:
         "limits": limits_value(options.limits, robot),
         "tolerance": as_number_or_text(options.tolerance),
         "via": [via_table(each, robot) for each in options.via],
-        "keep": [keep_table(each) for each in options.keep],
+        "keep": _kept(options),
         "obstacles": [obstacle_table(each, folder) for each in options.obstacles],
         "grasped": [each.to_dict() for each in options.grasped],
         "scheme": _scheme_table(options),
@@ -132,6 +131,14 @@ def _option_keys(task: Task, folder: Path) -> dict[str, Any]:
                 "the task without it."
             )
     return {name: keys[name] for name in option_infos(PlanOptions) if name in keys}
+
+
+def _kept(options: PlanOptions) -> list[dict[str, Any]]:
+    if not options.keep:
+        return []
+    from hovi.planning.task_file.keep_tables import keep_table  # most motions keep nothing
+
+    return [keep_table(each) for each in options.keep]
 
 
 def _plain(name: str, options: PlanOptions) -> Any:
