@@ -10,6 +10,7 @@ from .kept.on_line import OnLine as OnLine
 from .kept.on_plane import OnPlane as OnPlane
 from .kept.row import CasadiRow as CasadiRow
 from .kept.row import Formula as Formula
+from .kept.together import Together as Together
 from .kept.tool_speed import ToolAcceleration as ToolAcceleration
 from .kept.tool_speed import ToolSpeed as ToolSpeed
 from .kept.upright import Upright as Upright

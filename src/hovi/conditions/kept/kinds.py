@@ -14,12 +14,14 @@ from hovi.conditions.kept.keep_pose import KeepPose
 from hovi.conditions.kept.on_line import OnLine
 from hovi.conditions.kept.on_plane import OnPlane
 from hovi.conditions.kept.row import Formula
+from hovi.conditions.kept.together import Together
 from hovi.conditions.kept.tool_speed import ToolAcceleration, ToolSpeed
 from hovi.conditions.kept.upright import Upright
 from hovi.errors import InputError, nearest
 
-_FRAMES = Upright, OnLine, OnPlane, KeepOrientation, KeepPose, Follow, ToolSpeed, ToolAcceleration
-KINDS: dict[str, type[Keep]] = {each.kind: each for each in (*_FRAMES, Formula)}
+_PLACES = Upright, OnLine, OnPlane, KeepOrientation, KeepPose, Together, Follow
+_OTHERS = ToolSpeed, ToolAcceleration, Formula
+KINDS: dict[str, type[Keep]] = {each.kind: each for each in (*_PLACES, *_OTHERS)}
 """The classes that scene files name, by kind."""
 
 
