@@ -1,0 +1,123 @@
+"""A motion as a URScript program for an arm of Universal Robots.
+
+The program moves to the start by `movej`, follows the samples by `servoj`, one for each step of the
+controller, holds the end, and stops. As the manual asks [URScript]: "def" and "end" begin in the
+first column and all other lines are indented, text is ASCII, angles are in [rad] in the order base,
+shoulder, elbow, wrist 1 to 3, the lookahead time is 0.03 to 0.2 s and the gain 100 to 2000.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import re
+from pathlib import Path
+
+from hovi.discrete.joined_motion import AnyMotion, JoinedMotion
+from hovi.discrete.output.caution import caution_lines
+from hovi.errors import InputError, warn
+from hovi.exchange.arm_samples import UNIVERSAL_ROBOTS, arm_samples
+from hovi.exchange.whole_export import whole_export
+from hovi.version import __version__
+
+LOOKAHEAD_TIMES = 0.03, 0.2
+"""Least and largest lookahead time that servoj takes, in [s]."""
+GAINS = 100.0, 2000.0
+"""Least and largest gain that servoj takes."""
+FRAME = 0.002
+"""Time of a step of the controller, in [s]; controllers before the e-Series have 0.008."""
+APPROACH_SPEED, APPROACH_ACCELERATION = 0.25, 0.5
+"""Joint speed of the move to the start, in [rad/s], and its acceleration, in [rad/s^2]."""
+STOP = 2.0
+"""Deceleration of the stop after the end, in [rad/s^2]."""
+DIGITS = 9
+"""Decimals of an angle; no exponents, of which the manual says nothing."""
+MANY = 2_500
+"""Targets above which users report programs that an arm did not start."""
+
+
+def write_urscript(
+    motion: AnyMotion,
+    path: str | os.PathLike[str],
+    rate: float = 125.0,
+    *,
+    lookahead_time: float = 0.1,
+    gain: float = 300.0,
+) -> None:
+    """Write the program, completely or not at all.
+
+    rate: targets per second; 1/rate must be a multiple of 2 ms.
+    lookahead_time: of servoj, 0.03 to 0.2, in [s]. gain: of servoj, 100 to 2000.
+    Raises InputError for other values, and for a motion that `arm_samples` refuses; DisplayError
+    when the file cannot be written.
+    """
+    _require_range("lookahead_time", lookahead_time, LOOKAHEAD_TIMES, " s")
+    _require_range("gain", gain, GAINS, "")
+    samples = arm_samples(motion, rate, UNIVERSAL_ROBOTS)
+    step = _step(rate)
+    targets = [_angles(row) for row in samples.q.tolist()]
+    if len(targets) > MANY:
+        warn(
+            f"this program has {len(targets):,} targets, and arms of some users started none of "
+            f"more than {MANY:,}: try it with a lower rate, or with shorter motions."
+        )
+    held = step * math.ceil(round(lookahead_time / step, 6))
+    tuned = f"lookahead_time={lookahead_time:g}, gain={gain:g}"
+    approach = f"a={APPROACH_ACCELERATION:g}, v={APPROACH_SPEED:g}"
+    lines = [
+        *(f"# {_plain(each)}" for each in _comments(motion, samples.names, len(targets), step)),
+        f"movej({targets[0]}, {approach})",
+        *(f"servoj({each}, t={step:g}, {tuned})" for each in targets[1:]),
+        f"servoj({targets[-1]}, t={held:g}, {tuned})",
+        f"stopj({STOP:g})",
+    ]
+    program = [f"def {_name(path)}():", *(f"  {each}" for each in lines), "end"]
+    with whole_export(path, "program") as stream:
+        stream.write("".join(f"{each}\n" for each in program).encode("ascii"))
+
+
+def _step(rate: float) -> float:
+    """The time between targets, in [s]. Raises InputError if it is no multiple of FRAME."""
+    frames = 1.0 / (rate * FRAME)
+    if frames < 0.5 or abs(frames - round(frames)) > 1e-9 * frames:
+        raise InputError(
+            f"a rate of {rate:g} gives a step of {1e3 / rate:.6g} ms, and the controller needs a "
+            "multiple of 2 ms: use 500, 250 or 125 samples per second, or 100."
+        )
+    return round(frames) * FRAME
+
+
+def _require_range(name: str, value: float, bounds: tuple[float, float], unit: str) -> None:
+    lower, upper = bounds
+    if not lower <= value <= upper:
+        raise InputError(f"`{name}` of servoj must be {lower:g} to {upper:g}{unit}, got {value}.")
+
+
+def _comments(motion: AnyMotion, names: tuple[str, ...], targets: int, step: float) -> list[str]:
+    """The robot, the duration, the joints and the cautions."""
+    robot = "a robot" if motion.robot is None else motion.robot.name
+    parts = len(motion.motions) if isinstance(motion, JoinedMotion) else 1
+    gaps = (
+        f", {parts} motions, {motion.gap:g} s between" if isinstance(motion, JoinedMotion) else ""
+    )
+    return [
+        f"{robot}: {motion.duration:.6g} s{gaps}, {targets - 1} steps of {step:g} s",
+        f"joints: {', '.join(names)}",
+        f"written by hovi {__version__}; the move to the start looks at no obstacles",
+        *caution_lines([motion.metadata]),
+    ]
+
+
+def _name(path: str | os.PathLike[str]) -> str:
+    """A name for the program: that of the file, behind a word that no other name begins with."""
+    return "hovi_" + re.sub(r"[^A-Za-z0-9]+", "_", Path(path).stem)[:40].strip("_")
+
+
+def _plain(text: str) -> str:
+    """One line of ASCII."""
+    return "".join(each if " " <= each <= "~" else "?" for each in text)
+
+
+def _angles(row: list[float]) -> str:
+    """A list of angles; zero has no sign."""
+    return f"[{', '.join(f'{round(x, DIGITS) + 0.0:.{DIGITS}f}' for x in row)}]"
