@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -84,6 +85,18 @@ def test_steps_of_programs_keep_the_velocities_of_the_plan(ur5: hovi.Robot, tmp_
     q, t = np.vstack([program.start, program.targets]), np.append(0.0, program.times)
     speed = np.abs(np.diff(q, axis=0)) / np.diff(t)[:, None]
     assert 0.85 < speed.max() <= 0.9 * (1 + 1e-6)  # the limit is reached
+
+
+def test_the_program_that_the_docs_show_is_the_one_that_is_written(tmp_path: Path) -> None:
+    """But for "...": the numbers of its first and last lines are those of its ends and durations."""
+    page = Path(__file__).resolve().parents[2] / "docs" / "howto" / "arms.md"
+    shown = re.search(r"```text\n(.*?)\n```", page.read_text(), re.S)
+    assert shown
+    robot, home = hovi.load_robot("ur10"), [0.0, -1.57, 1.57, -1.57, -1.57, 0.0]
+    there, back = resting(robot, home, B6, 2.0)[0], resting(robot, B6, home, 2.5)[0]
+    hovi.export([there, back], tmp_path / "fetch.script", gap=1.0)
+    pattern = ".*?".join(re.escape(each) for each in shown[1].split("..."))
+    assert re.fullmatch(pattern + "\n", (tmp_path / "fetch.script").read_text(), re.S)
 
 
 def test_joints_are_in_the_order_of_the_controller_whatever_that_of_the_robot(

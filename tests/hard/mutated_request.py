@@ -67,7 +67,7 @@ def _error_in(task: hovi.Task, path: Path) -> str:
     text = path.read_text().rstrip().removesuffix("\n---")
     message = yaml.load(text, Loader=yaml.CBaseLoader)  # all scalars as text
     state = _table(_table(message.get("start_state")).get("joint_state"))
-    names, numbers = (state[key] if key in state else [] for key in ("name", "position"))
+    names, numbers = (_list(state.get(key)) for key in ("name", "position"))
     wanted = robot.pose("default")
     for name, number in zip(names, numbers, strict=False):
         if name in robot.joint_names:
@@ -92,6 +92,11 @@ def _error_in(task: hovi.Task, path: Path) -> str:
 def _table(given: Any) -> dict[str, Any]:
     """A table; an empty one for what is none, such as null."""
     return given if isinstance(given, dict) else {}
+
+
+def _list(given: Any) -> list[Any]:
+    """A list; an empty one for what is none."""
+    return given if isinstance(given, list) else []
 
 
 def _places(value: Any) -> list[tuple[Any, Any]]:
