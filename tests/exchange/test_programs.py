@@ -88,7 +88,7 @@ def test_steps_of_programs_keep_the_velocities_of_the_plan(ur5: hovi.Robot, tmp_
 
 
 def test_the_program_that_the_docs_show_is_the_one_that_is_written(tmp_path: Path) -> None:
-    """But for "...": the numbers of its first and last lines are those of its ends and durations."""
+    """But for "...": its first and last lines have the numbers of its ends and durations."""
     page = Path(__file__).resolve().parents[2] / "docs" / "howto" / "arms.md"
     shown = re.search(r"```text\n(.*?)\n```", page.read_text(), re.S)
     assert shown
@@ -154,8 +154,9 @@ def test_text_in_a_program_cannot_be_a_command(ur5: hovi.Robot, tmp_path: Path) 
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"rate": 60.0}, r"a step of 16\.6667 ms, and the controller needs a multiple of 2 ms"),
-        ({"rate": 1000.0}, r"a step of 1 ms"),
+        ({"rate": 60.0}, r"2 ms apart or a multiple of it, got a rate of 60: use 500"),
+        ({"rate": 1000.0}, r"got a rate of 1000"),
+        ({"rate": 5.0}, r"a program needs 10 targets per second or more, .* got a rate of 5:"),
         (
             {"lookahead_time": 0.02},
             r"`lookahead_time` of servoj must be 0\.03 to 0\.2 s, got 0\.02",

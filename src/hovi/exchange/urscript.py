@@ -26,6 +26,8 @@ GAINS = 100.0, 2000.0
 """Least and largest gain that servoj takes."""
 FRAME = 0.002
 """Time of a step of the controller, in [s]; controllers before the e-Series have 0.008."""
+LEAST_RATE = 10.0
+"""Least number of targets per second: the arm goes from one to the next as fast as it can."""
 APPROACH_SPEED, APPROACH_ACCELERATION = 0.25, 0.5
 """Joint speed of the move to the start, in [rad/s], and its acceleration, in [rad/s^2]."""
 STOP = 2.0
@@ -78,11 +80,11 @@ def write_urscript(
 
 def _step(rate: float) -> float:
     """The time between targets, in [s]. Raises InputError if it is no multiple of FRAME."""
-    frames = 1.0 / (rate * FRAME)
-    if frames < 0.5 or abs(frames - round(frames)) > 1e-9 * frames:
+    frames = 1.0 / (max(rate, LEAST_RATE) * FRAME)
+    if rate < LEAST_RATE or frames < 0.5 or abs(frames - round(frames)) > 1e-9 * frames:
         raise InputError(
-            f"a rate of {rate:g} gives a step of {1e3 / rate:.6g} ms, and the controller needs a "
-            "multiple of 2 ms: use 500, 250 or 125 samples per second, or 100."
+            f"a program needs {LEAST_RATE:g} targets per second or more, {1e3 * FRAME:g} ms apart or "
+            f"a multiple of it, got a rate of {rate:g}: use 500, 250, 125 or 100."
         )
     return round(frames) * FRAME
 
