@@ -84,6 +84,8 @@ def test_a_program_of_joined_motions_follows_each_of_them(
     program = read_urscript((tmp_path / "cycle.script").read_bytes())
     t = np.minimum(program.times, sum(LENGTHS) + GAP)
     np.testing.assert_allclose(program.targets, closed_form(parts, t, GAP)[0], atol=1e-9)
+    marks = [(88, "0.7 s: rest"), (119, "0.95 s: motion 2")]
+    assert program.marks == [(0, "0 s: motion 1"), *[(k - 1, text) for k, text in marks]]
     assert program.comments[0] == "ur5: 1.4 s, 2 motions, 0.25 s between, 175 steps of 0.008 s"
 
 

@@ -16,6 +16,7 @@ import hovi
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import HoviWarning, InputError
 from hovi.exchange.joint_trajectory import joint_trajectory
+from hovi.scene.segment_scenes import SegmentScenes
 from oracles.programs import Program, read_franka, read_urscript
 from samples.cubic_motion import Cubic, cubic_motion
 
@@ -97,6 +98,24 @@ def test_the_program_that_the_docs_show_is_the_one_that_is_written(tmp_path: Pat
     hovi.export([there, back], tmp_path / "fetch.script", gap=1.0)
     pattern = ".*?".join(re.escape(each) for each in shown[1].split("..."))
     assert re.fullmatch(pattern + "\n", (tmp_path / "fetch.script").read_text(), re.S)
+
+
+def test_segments_are_named_where_they_begin(
+    motion: tuple[Trajectory, Cubic], tmp_path: Path
+) -> None:
+    """As for the commands of a gripper, which users put there: after the last target before it."""
+    from dataclasses import replace
+
+    scene = motion[0].scene
+    assert scene is not None
+    parts = SegmentScenes((scene, scene, scene), (1, 1, 3))
+    named = {"segment_names": ["reach", "close\nstopj(2)", "carry"]}
+    program = written(replace(motion[0], scene=None, segments=parts, metadata=named), tmp_path)
+    marks = [(0, "0 s: reach"), (17, "0.14 s: close?stopj(2)"), (35, "0.28 s: carry")]
+    assert program.marks == marks
+    begun = np.array([at for at, _ in marks]) * 0.008
+    assert (begun <= [0.0, 0.14, 0.28]).all()
+    assert (begun + 0.008 > [0.0, 0.14, 0.28]).all()
 
 
 def test_joints_are_in_the_order_of_the_controller_whatever_that_of_the_robot(

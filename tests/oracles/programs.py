@@ -28,7 +28,8 @@ class Program:
     """What an arm does: it goes to `start` (6,), then has `targets` (M, 6), in [rad], at `times`.
 
     times: when each target is to be reached after the move to the start, (M,), in [s].
-    comments: lines after "#".
+    comments: lines after "#" before the first command. marks: those between targets, each with the
+    number of targets before it.
     """
 
     name: str
@@ -37,10 +38,11 @@ class Program:
     targets: Array
     comments: list[str]
     tuning: set[tuple[float, float]]
+    marks: list[tuple[int, str]]
 
 
 def read_urscript(data: bytes) -> Program:
-    """A program of the form: def, comments, movej, servoj once or more, stopj, end.
+    """A program of the form: def, comments, movej, servoj and comments, stopj, end.
 
     Raises AssertionError for any other line, and for arguments outside the manual's ranges.
     """
@@ -52,14 +54,17 @@ def read_urscript(data: bytes) -> Program:
     assert head, lines[0]
     assert lines[-1] == "end"
     body = lines[1:-1]
-    comments = [line.strip()[1:].strip() for line in body if COMMENT.fullmatch(line)]
-    commands = body[len(comments) :]
+    first = next(k for k, line in enumerate(body) if not COMMENT.fullmatch(line))
+    comments, commands = [_said(line) for line in body[:first]], body[first:]
     move, stop = MOVEJ.fullmatch(commands[0]), STOPJ.fullmatch(commands[-1])
     assert move, commands[0]
     assert stop, commands[-1]
     assert min(float(move[2]), float(move[3]), float(stop[1])) > 0
-    targets, steps, tuning = [], [], set()
+    targets, steps, marks, tuning = [], [], [], set()
     for line in commands[1:-1]:
+        if COMMENT.fullmatch(line):
+            marks.append((len(targets), _said(line)))
+            continue
         found = SERVOJ.fullmatch(line)
         assert found, line
         targets.append(_numbers(found[1]))
@@ -69,9 +74,8 @@ def read_urscript(data: bytes) -> Program:
     frames = np.array(steps) / CONTROLLER_FRAME
     assert (frames > 0.5).all()
     np.testing.assert_allclose(frames, np.round(frames), atol=1e-9)
-    return Program(
-        head[1], _numbers(move[1]), np.cumsum(steps), np.array(targets), comments, tuning
-    )
+    times = np.cumsum(steps)
+    return Program(head[1], _numbers(move[1]), times, np.array(targets), comments, tuning, marks)
 
 
 def read_franka(data: bytes) -> Array:
@@ -93,6 +97,10 @@ def read_franka(data: bytes) -> Array:
             at = found.end() if delimiter is None else delimiter.end()
         rows.append(row)
     return np.array(rows)
+
+
+def _said(comment: str) -> str:
+    return comment.strip()[1:].strip()
 
 
 def _numbers(text: str) -> Array:

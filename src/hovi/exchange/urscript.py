@@ -11,9 +11,11 @@ from __future__ import annotations
 import math
 import os
 import re
+from collections.abc import Iterator
 from pathlib import Path
 
 from hovi.discrete.joined_motion import AnyMotion, JoinedMotion
+from hovi.discrete.measures.motion_segments import motion_segments
 from hovi.discrete.output.caution import caution_lines
 from hovi.errors import InputError, warn
 from hovi.exchange.arm_samples import UNIVERSAL_ROBOTS, arm_samples
@@ -67,9 +69,9 @@ def write_urscript(
     tuned = f"lookahead_time={lookahead_time:g}, gain={gain:g}"
     approach = f"a={APPROACH_ACCELERATION:g}, v={APPROACH_SPEED:g}"
     lines = [
-        *(f"# {_plain(each)}" for each in _comments(motion, samples.names, len(targets), step)),
+        *(_comment(each) for each in _head(motion, samples.names, len(targets), step)),
         f"movej({targets[0]}, {approach})",
-        *(f"servoj({each}, t={step:g}, {tuned})" for each in targets[1:]),
+        *_marked([f"servoj({each}, t={step:g}, {tuned})" for each in targets[1:]], motion, step),
         f"servoj({targets[-1]}, t={held:g}, {tuned})",
         f"stopj({STOP:g})",
     ]
@@ -83,8 +85,8 @@ def _step(rate: float) -> float:
     frames = 1.0 / (max(rate, LEAST_RATE) * FRAME)
     if rate < LEAST_RATE or frames < 0.5 or abs(frames - round(frames)) > 1e-9 * frames:
         raise InputError(
-            f"a program needs {LEAST_RATE:g} targets per second or more, {1e3 * FRAME:g} ms apart or "
-            f"a multiple of it, got a rate of {rate:g}: use 500, 250, 125 or 100."
+            f"a program needs {LEAST_RATE:g} targets per second or more, {1e3 * FRAME:g} ms apart "
+            f"or a multiple of it, got a rate of {rate:g}: use 500, 250, 125 or 100."
         )
     return round(frames) * FRAME
 
@@ -95,7 +97,27 @@ def _require_range(name: str, value: float, bounds: tuple[float, float], unit: s
         raise InputError(f"`{name}` of servoj must be {lower:g} to {upper:g}{unit}, got {value}.")
 
 
-def _comments(motion: AnyMotion, names: tuple[str, ...], targets: int, step: float) -> list[str]:
+def _marked(commands: list[str], motion: AnyMotion, step: float) -> Iterator[str]:
+    """The commands, with a comment where a rest, a motion or a segment begins, as for a gripper."""
+    marks = [(math.floor(round(t / step, 6)), t, text) for t, text in _marks(motion)]
+    for k, command in enumerate(commands):
+        yield from (_comment(f"{t:.6g} s: {text}") for at, t, text in marks if at == k)
+        yield command
+
+
+def _marks(motion: AnyMotion) -> Iterator[tuple[float, str]]:
+    """When what begins, in [s]; nothing for one motion without segments."""
+    if not isinstance(motion, JoinedMotion):
+        yield from ((each.begin, each.name) for each in motion_segments(motion))
+        return
+    for k, (start, part) in enumerate(zip(motion.starts.tolist(), motion.motions, strict=True)):
+        if k and motion.gap:
+            yield start - motion.gap, "rest"
+        yield start, f"motion {k + 1}"
+        yield from ((start + t, text) for t, text in _marks(part))
+
+
+def _head(motion: AnyMotion, names: tuple[str, ...], targets: int, step: float) -> list[str]:
     """The robot, the duration, the joints and the cautions."""
     robot = "a robot" if motion.robot is None else motion.robot.name
     parts = len(motion.motions) if isinstance(motion, JoinedMotion) else 1
@@ -115,9 +137,9 @@ def _name(path: str | os.PathLike[str]) -> str:
     return "hovi_" + re.sub(r"[^A-Za-z0-9]+", "_", Path(path).stem)[:40].strip("_")
 
 
-def _plain(text: str) -> str:
-    """One line of ASCII."""
-    return "".join(each if " " <= each <= "~" else "?" for each in text)
+def _comment(text: str) -> str:
+    """A comment of one line of ASCII."""
+    return "# " + "".join(each if " " <= each <= "~" else "?" for each in text)
 
 
 def _angles(row: list[float]) -> str:

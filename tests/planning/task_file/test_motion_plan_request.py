@@ -135,8 +135,17 @@ def variants() -> dict[str, str]:
         for axis in "xyz"
     }
     position = text[: text.index("- position_constraints")]
+    tilted = text.replace(
+        "{x: 0.9238795325112867, y: -0.3826834323650898, z: 0.0, w: 0.0}",
+        "{x: 0.9, y: -0.38, z: 0.1, w: 0.1886796226411321}",
+    )
+    assert tilted != text
     return {
         "pose": text,
+        "tilted": tilted,
+        "tilted, y free": tilted.replace(
+            "y_axis_tolerance: 0.001", "y_axis_tolerance: 6.3"
+        ).replace(offset, ""),
         "position": text[:start].replace(offset, "") + text[end:],
         "orientation": position + "- " + text[start:].lstrip(),
         "z free": free["z"],
@@ -156,7 +165,7 @@ def test_goals_of_links_satisfy_the_constraints(
     text = variants()[name]
     goal = read(text, scene, tmp_path).goal
     assert isinstance(goal, FrameGoal)
-    free = {"pose": 6, "box": 6, "world": 6, "position": 3, "orientation": 3}
+    free = {"pose": 6, "tilted": 6, "box": 6, "world": 6, "position": 3, "orientation": 3}
     assert goal.equations == free.get(name, 5)
     kinds = {"position": {"distance"}, "orientation": {"angle"}}
     for q in hovi.inverse_kinematics(scene.robot, goal, most=3):
@@ -186,10 +195,14 @@ def test_a_frame_that_is_fixed_to_the_base_places_the_goal(tmp_path: Path) -> No
         "start_state: {joint_state: {name: [j1, j2, j3], position: [0.1, 0.2, 0.3]}}\n"
         "goal_constraints: [{position_constraints: [{header: {frame_id: table}, link_name: c,\n"
         "  constraint_region: {primitives: [{type: 2, dimensions: [0.01]}],\n"
-        "    primitive_poses: [{position: {x: 0.3, y: -0.1}}]}}]}]\n"
+        "    primitive_poses: [{position: {x: 0.3, y: -0.1}}]}}],\n"
+        "  orientation_constraints: [{header: {frame_id: table}, link_name: c,\n"
+        "    orientation: {x: 0.6, w: 0.8}}]}]\n"
     )
     goal = read(text, scene, tmp_path).goal
     assert isinstance(goal, FrameGoal)
+    turned = pin.rpy.rpyToMatrix(0, 0, np.pi / 2) @ pin.Quaternion(0.8, 0.6, 0.0, 0.0).matrix()
+    np.testing.assert_allclose(np.asarray(goal.rotation), turned, atol=1e-12)
     np.testing.assert_allclose(np.asarray(goal.position), [0.3, 0.4, 0.5], atol=1e-12)
     moving = text.replace("frame_id: table", "frame_id: b")
     with pytest.raises(SceneError, match="the frame 'b' moves with the robot"):

@@ -57,7 +57,7 @@ def export(
 
     given, files = _output(positional, out), [file, *(then or [])]
     chosen = _format(format_, csv, given)
-    target = check_output(given or _beside(file, chosen.suffix), *chosen.suffixes)
+    target = check_output(given or _beside(file, chosen), *chosen.suffixes)
     for each in files:
         _require_other_file(target, each)
     motions = [load_shown(each, package_dir) for each in files]
@@ -81,12 +81,14 @@ def _format(name: str | None, csv: bool, out: Path | None) -> ExportFormat:
     raise InputError(f"no export format was given; use --format with one of {names}.")
 
 
-def _beside(file: Path, suffix: str) -> Path:
-    """The file with another extension, and another name where it has that one itself."""
+def _beside(file: Path, chosen: ExportFormat) -> Path:
+    """The file with another extension, and another name where that says another format."""
     from hovi.cli.arguments.files import next_to
 
-    other = next_to(file, suffix)
-    return file.with_name(f"{file.stem}_samples{suffix}") if other == file else other
+    other = next_to(file, chosen.suffix)
+    if not chosen.has_suffix:
+        return file.with_name(f"{file.stem}_{chosen.name.replace('-', '_')}{chosen.suffix}")
+    return file.with_name(f"{file.stem}_samples{chosen.suffix}") if other == file else other
 
 
 def _require_other_file(target: Path, file: Path) -> None:
