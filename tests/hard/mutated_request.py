@@ -44,9 +44,10 @@ def mutate(random: Random) -> Mutant:
         for _ in range(random.randint(1, 3)):
             holder, key = random.choice(_places(message))
             holder[key] = random.choice(VALUES)
-        return Mutant(json.dumps(message).encode())
+        return Mutant(json.dumps(_wrapped(message, random)).encode())
     change = random.choice((_unknown_key, _not_finite, _unsupported, _no_goal))
     change(message, random)
+    message = _wrapped(message, random)
     return Mutant(json.dumps(message).encode(), (change.__doc__ or "").split("\n")[0])
 
 
@@ -66,6 +67,7 @@ def _error_in(task: hovi.Task, path: Path) -> str:
     robot = task.scene.robot
     text = path.read_text().rstrip().removesuffix("\n---")
     message = yaml.load(text, Loader=yaml.CBaseLoader)  # all scalars as text
+    message = message.get("request") or message.get("motion_plan_request") or message
     state = _table(_table(message.get("start_state")).get("joint_state"))
     names, numbers = (_list(state.get(key)) for key in ("name", "position"))
     wanted = robot.pose("default")
@@ -97,6 +99,12 @@ def _table(given: Any) -> dict[str, Any]:
 def _list(given: Any) -> list[Any]:
     """A list; an empty one for what is none."""
     return given if isinstance(given, list) else []
+
+
+def _wrapped(message: Any, random: Random) -> Any:
+    """The message, or the goal of an action or the request of a service with it."""
+    name = random.choice(("request", "motion_plan_request", "", "", "", ""))
+    return {name: message} if name else message
 
 
 def _places(value: Any) -> list[tuple[Any, Any]]:

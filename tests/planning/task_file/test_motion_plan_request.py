@@ -92,6 +92,27 @@ def test_a_request_of_joints_gives_their_positions_and_leaves_the_others_free(
     )
 
 
+def test_a_request_may_be_in_the_goal_of_an_action_or_in_that_of_a_service(
+    scene: hovi.Scene, tmp_path: Path
+) -> None:
+    """As they stand in commands of `ros2 action send_goal` and `ros2 service call`."""
+    message = yaml.safe_load(LINK_REQUEST)
+    options = {"plan_only": True, "planning_scene_diff": {"world": {"collision_objects": []}}}
+    wanted = read(LINK_REQUEST, scene, tmp_path).goal
+    for whole in (
+        {"request": message, "planning_options": options},
+        {"motion_plan_request": message},
+    ):
+        goal = read(yaml.safe_dump(whole), scene, tmp_path).goal
+        assert isinstance(goal, FrameGoal)
+        assert isinstance(wanted, FrameGoal)
+        np.testing.assert_array_equal(goal.position, wanted.position)  # type: ignore[arg-type]
+    options["planning_scene_diff"] = {"world": {"collision_objects": [{"id": "table"}]}}
+    moved = {"request": message, "planning_options": options}
+    with pytest.raises(SceneError, match="`planning_options` is not supported, as obstacles are"):
+        read(yaml.safe_dump(moved), scene, tmp_path)
+
+
 def test_scaling_factors_are_fractions_of_limits(scene: hovi.Scene, tmp_path: Path) -> None:
     task = read(no_group(JOINT_REQUEST), scene, tmp_path)
     assert task.options.limits == {"base": "urdf", "v": "40.0 %"}

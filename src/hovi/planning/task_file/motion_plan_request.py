@@ -58,7 +58,9 @@ def load_motion_plan_request(
     scaling factors are fractions of the limits on velocities and accelerations. The task's note
     names what chooses how MoveIt plans and means nothing here, such as `allowed_planning_time`.
 
-    file: YAML, as `ros2 topic echo` prints it. scene: the robot, and the effects that act on it.
+    file: YAML, as `ros2 topic echo` prints it; or the goal of the action MoveGroup or the request
+        of the service GetMotionPlan, which have it as a field.
+    scene: the robot, and the effects that act on it.
     duration: of the motion, which no request has, in [s], or bounds of a free one.
     start: positions of the joints that `start_state` leaves out, as for `hovi.plan`.
     limits: those that are scaled: "urdf", or the name of an arm for limits on accelerations.
@@ -66,7 +68,7 @@ def load_motion_plan_request(
     Raises SceneError with file and line for an invalid file and for what is not supported, such as
     constraints of the path; InputError for other arguments.
     """
-    root, robot = read_yaml(Path(file)), scene.robot
+    root, robot = _request(read_yaml(Path(file))), scene.robot
     keys = root.mapping(*_READ, *_REFUSED, *_UNUSED)
     for name, why in _REFUSED.items():
         refuse(keys, name, why)
@@ -81,6 +83,20 @@ def load_motion_plan_request(
     options = PlanOptions(limits=_limits(keys, robot, limits), group=group, obstacles=obstacles)
     note = _note(Path(file).name, keys, measured)
     return _task(root, scene, State(positions, rates or None), goal, duration, options, note)
+
+
+def _request(root: YamlNode) -> YamlNode:
+    """The request itself, which an action has as `request`, and a service by its own name."""
+    if not root.is_mapping:
+        return root
+    names = {YamlNode(key, root.path).text() for key, _ in root.node.value}
+    if names & {"motion_plan_request"}:
+        return root.mapping("motion_plan_request").need("motion_plan_request")
+    if names & {"request", "planning_options"}:
+        keys = root.mapping("request", "planning_options")
+        refuse(keys, "planning_options", "obstacles are read from `planning_scene`")
+        return keys.need("request")
+    return root
 
 
 def _task(
