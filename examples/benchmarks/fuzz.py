@@ -35,6 +35,7 @@ KINDS = {
     "motion_meshes": ("hard.mutated_motion_meshes", 3_000),
     "segments": ("hard.mutated_segments", 6_000),
     "obstacles": ("hard.mutated_obstacles", 10_000),
+    "request": ("hard.mutated_request", 6_000),
     "study": ("hard.mutated_study", 6_000),
     "command": ("hard.mutated_command", 2_000),
     "compiled": ("hard.compiled_calls", 14_000),

@@ -87,6 +87,9 @@ from .planning.solver.outcome.margins import Margins as Margins
 from .planning.solver.outcome.solution_factor import SolutionFactor as SolutionFactor
 from .planning.solver.solver import Solution as Solution
 from .planning.solver.status import Status as Status
+from .planning.task_file.motion_plan_request import (
+    load_motion_plan_request as load_motion_plan_request,
+)
 from .planning.task_file.reading import load_task as load_task
 from .planning.task_file.task import Task as Task
 from .planning.task_file.task_plan import plan_task as plan_task

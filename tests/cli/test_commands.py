@@ -18,11 +18,14 @@ from typing import Any
 import numpy as np
 import pytest
 
+import hovi
 from hovi.cli.application import main
 from hovi.cli.reports.arm_limits import limit_set_json, limit_set_text
 from hovi.discrete.trajectory import Trajectory
 from hovi.planning.problem.arms.limit_set import limit_set
 from hovi.robot.bundled_models import example, example_scenes
+from oracles.programs import read_urscript
+from samples.cubic_motion import Cubic, cubic_motion
 
 REACH = example("two_link_reach.toml").read_text()
 URDF = example("two_link.urdf").read_text()
@@ -551,13 +554,38 @@ def test_nothing_is_written_where_there_is_no_motion(run: Run, tmp_path: Path) -
 def test_every_format_has_a_file_name_of_its_own(run: Run, motion: Path, tmp_path: Path) -> None:
     saved = tmp_path / "reach.npz"
     saved.write_bytes(motion.read_bytes())
-    for name, target in (("numpy", "reach_samples.npz"), ("joint-trajectory", "reach.yaml")):
+    for name, target in (
+        ("numpy", "reach_samples.npz"),
+        ("joint-trajectory", "reach.yaml"),
+        ("robot-trajectory", "reach_robot_trajectory.yaml"),
+    ):
         code, out, _ = run("export", saved, "--format", name)
         assert code == 0
         assert str(tmp_path / target) in out
     assert saved.read_bytes() == motion.read_bytes()
     refused = run("export", saved, "--format", "numpy", "--out", saved)
     assert_refused(refused, "the motion itself")
+
+
+def test_motions_are_joined_in_one_export(run: Run, tmp_path: Path) -> None:
+    scene = hovi.Scene(hovi.load_robot("ur5"))
+    for name, ends in (("there", (0.1, 0.4)), ("back", (0.4, 0.1))):
+        cubic = Cubic.resting(*(np.full(6, x) for x in ends), 0.5)
+        cubic_motion(scene, 0.5, cubic=cubic)[0].save(tmp_path / f"{name}.npz")
+    there, back, out = (tmp_path / name for name in ("there.npz", "back.npz", "cycle.script"))
+    tuned = ("--lookahead-time", "0.05", "--gain", "500")
+    code, said, _ = run("export", there, "--then", back, "--gap", "0.2", "--out", out, *tuned)
+    assert (code, said.strip()) == (0, f"wrote {out}")
+    program = read_urscript(out.read_bytes())
+    assert program.tuning == {(0.05, 500.0)}
+    np.testing.assert_allclose(program.times[-2], 1.2, atol=1e-9)
+    np.testing.assert_allclose(program.targets[[61, 80]], 0.4, atol=2e-3)
+    again = run("export", there, "--then", there, "--out", tmp_path / "no.csv")
+    assert_refused(again, "motion 2 begins 0.3 rad or m of", "plan it from there")
+    assert_refused(run("export", there, "--gap", "1", "--csv"), "a gap is between motions")
+    assert_refused(run("export", there, "--gain", "1", "--csv"), "`gain` is for", "'urscript'")
+    assert_refused(run("export", there, "--then", back, "--out", back), "the motion itself")
+    assert not (tmp_path / "no.csv").exists()
 
 
 def test_a_motion_is_checked_in_mujoco(run: Run, motion: Path) -> None:

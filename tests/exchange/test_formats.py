@@ -13,7 +13,7 @@ from hovi.discrete.trajectory import Trajectory
 from hovi.errors import DisplayError, InputError
 from hovi.exchange.formats import FORMATS, ExportFormat, export_format
 from hovi.exchange.libraries import library
-from samples.cubic_motion import cubic_motion
+from samples.cubic_motion import Cubic, cubic_motion
 
 each_format = pytest.mark.parametrize("chosen", FORMATS, ids=lambda each: each.name)
 FILM = ("video", "gif")
@@ -26,9 +26,25 @@ MODULES = {
 }
 
 
+RATES = {"franka": 1000.0}
+"""Of formats with one rate alone; 20 for the others."""
+
+
 @pytest.fixture(scope="module")
 def motion(arm_scene: hovi.Scene) -> Trajectory:
     return cubic_motion(arm_scene, duration=0.4, schemes=["galerkin-2"] * 3)[0]
+
+
+@pytest.fixture(scope="module")
+def motions(motion: Trajectory, ur5: hovi.Robot, panda: hovi.Robot) -> dict[str, Trajectory]:
+    """A motion for each format: those of programs are of their arms, at rest at both ends."""
+
+    def resting(robot: hovi.Robot) -> Trajectory:
+        cubic = Cubic.resting(0.5 * np.ones(robot.nv), 0.5001 * np.ones(robot.nv), 2.0)
+        return cubic_motion(hovi.Scene(robot), 2.0, ["galerkin-2"] * 3, cubic=cubic)[0]
+
+    arms = {"urscript": resting(ur5), "franka": resting(panda)}
+    return {each.name: arms.get(each.name, motion) for each in FORMATS}
 
 
 def require_library(chosen: ExportFormat) -> None:
@@ -37,8 +53,9 @@ def require_library(chosen: ExportFormat) -> None:
 
 
 def test_names_and_suffixes_are_distinct() -> None:
-    suffixes = [suffix for each in FORMATS for suffix in each.suffixes]
+    suffixes = [suffix for each in FORMATS if each.has_suffix for suffix in each.suffixes]
     assert len(set(suffixes)) == len(suffixes)
+    assert {suffix for each in FORMATS for suffix in each.suffixes} == set(suffixes)
     assert len({each.name for each in FORMATS}) == len(FORMATS)
 
 
@@ -49,37 +66,39 @@ def test_a_format_is_found_by_its_name(chosen: ExportFormat) -> None:
 
 @each_format
 def test_a_motion_has_a_method_for_every_format(
-    chosen: ExportFormat, motion: Trajectory, tmp_path: Path
+    chosen: ExportFormat, motions: dict[str, Trajectory], tmp_path: Path
 ) -> None:
     require_library(chosen)
+    motion, rate = motions[chosen.name], RATES.get(chosen.name, 20.0)
     if chosen.name in FILM:
         assert hasattr(motion, f"to_{chosen.name}")  # filmed by the tests of films
         return
     for suffix in chosen.suffixes:
         path = tmp_path / f"motion{suffix}"
-        getattr(motion, f"to_{chosen.name.replace('-', '_')}")(path, 20.0)
+        getattr(motion, f"to_{chosen.name.replace('-', '_')}")(path, rate)
         again = tmp_path / f"again{suffix}"
-        hovi.export(motion, again, rate=20.0)
+        hovi.export(motion, again, chosen.name, rate=rate)
         assert path.stat().st_size == pytest.approx(again.stat().st_size, rel=0.02)
 
 
 @each_format
 @pytest.mark.parametrize("rate", [0.0, -1.0, np.nan, np.inf, 1e300])
 def test_an_invalid_rate_raises_and_writes_nothing(
-    chosen: ExportFormat, rate: float, motion: Trajectory, tmp_path: Path
+    chosen: ExportFormat, rate: float, motions: dict[str, Trajectory], tmp_path: Path
 ) -> None:
     with pytest.raises(InputError, match=r"positive number of samples per second|choose a lower"):
-        chosen.write(motion, tmp_path / f"motion{chosen.suffix}", rate)
+        chosen.write(motions[chosen.name], tmp_path / f"motion{chosen.suffix}", rate)
     assert not list(tmp_path.iterdir())
 
 
 @each_format
 def test_an_unwritable_path_raises(
-    chosen: ExportFormat, motion: Trajectory, tmp_path: Path
+    chosen: ExportFormat, motions: dict[str, Trajectory], tmp_path: Path
 ) -> None:
     require_library(chosen)
+    path, rate = tmp_path / "no" / f"motion{chosen.suffix}", RATES.get(chosen.name, 10.0)
     with pytest.raises(DisplayError, match="cannot write"):
-        chosen.write(motion, tmp_path / "no" / f"motion{chosen.suffix}", 10.0)
+        chosen.write(motions[chosen.name], path, rate)
 
 
 def test_an_unknown_format_raises_with_a_suggestion(motion: Trajectory, tmp_path: Path) -> None:

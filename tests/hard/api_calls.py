@@ -35,9 +35,10 @@ from hovi.robot.space.configuration_space import ConfigurationSpace
 from hovi.scene.segment_scenes import SegmentScenes
 from hovi.scene.segmented_lagrangian import SegmentedLagrangian
 from hovi.schemes import by_name, galerkin
+from samples.cubic_motion import Cubic, cubic_motion
 from samples.meshes import WEDGE
 from samples.slider import SLIDER
-from samples.world_files import CUPBOARD, PLANNING_SCENE
+from samples.world_files import CUPBOARD, JOINT_REQUEST, PLANNING_SCENE
 
 Q, N, H = 2, 4, 0.1
 BALL = {"kind": "sphere", "position": [0.0, 0.0, 0.0], "radius": 0.1}
@@ -432,6 +433,7 @@ def _world_files() -> Path:
     (folder / "channel.obj").write_text(WEDGE)
     (folder / "cupboard.urdf").write_text(CUPBOARD)
     (folder / "kitchen.yaml").write_text(PLANNING_SCENE)
+    (folder / "request.yaml").write_text(JOINT_REQUEST)
     return folder
 
 
@@ -460,6 +462,11 @@ def _obstacles() -> list[Call]:
             **{"convex_parts": False, "path": None},
         ),
         call(hovi.load_obstacles, folder / "kitchen.yaml", **at),
+        call(
+            *(hovi.load_motion_plan_request, folder / "request.yaml", hovi.Scene(panda()), 1.0),
+            **{"start": "default", "limits": "urdf"},
+            planning_scene=folder / "kitchen.yaml",
+        ),
         build(
             hovi.Grasped,
             **{"shape": hovi.Sphere([0.0] * 3, 0.1), "frame": "forearm", "mass": 1.0, **at},
@@ -898,6 +905,14 @@ def _studies() -> list[Call]:
     ]
 
 
+def _resting(name: str) -> hovi.Trajectory:
+    """A motion of an arm from rest to rest."""
+    scene = hovi.Scene(hovi.load_robot(name))
+    start = np.full(scene.robot.nv, 0.01)
+    cubic = Cubic.resting(start, start, 0.5)
+    return cubic_motion(scene, 0.5, ["galerkin-2"] * 2, cubic=cubic)[0]
+
+
 def _files() -> list[Call]:
     trajectory = solution().trajectory
     npz, toml = folder() / "motion.npz", folder() / "task.toml"
@@ -911,7 +926,16 @@ def _files() -> list[Call]:
         call(hovi.load_task, toml),
         call(hovi.save_task, task, toml),
         call(hovi.write_csv, trajectory, folder() / "motion.csv", rate=100.0),
-        call(hovi.export, trajectory, folder() / "all.csv", "csv", rate=50.0, efforts=False),
+        call(
+            *(hovi.export, [trajectory], folder() / "all.csv", "csv"),
+            **{"rate": 50.0, "efforts": False, "gap": 0.0, "lookahead_time": None, "gain": None},
+        ),
+        own(trajectory, "to_robot_trajectory", folder() / "robot.json", 50.0),
+        own(
+            *(_resting("ur5"), "to_urscript", folder() / "all.script", 50.0),
+            **{"lookahead_time": 0.1, "gain": 300.0},
+        ),
+        own(_resting("panda"), "to_franka", folder() / "franka.csv", 1000.0),
         own(trajectory, "to_numpy", folder() / "all.npz", 50.0),
         own(trajectory, "to_joint_trajectory", folder() / "all.json", 50.0, efforts=True),
         own(trajectory, "to_mcap", folder() / "all.mcap", 50.0),

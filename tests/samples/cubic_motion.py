@@ -33,6 +33,16 @@ class Cubic:
         q, v, a = (np.stack(p, axis=1) @ self.coefficients for p in powers)
         return q, v, a
 
+    @classmethod
+    def resting(cls, start: npt.ArrayLike, end: npt.ArrayLike, duration: float) -> Cubic:
+        """From rest at `start` to rest at `end`, (n,) each, in `duration` [s]."""
+        q, moved = np.asarray(start, dtype=float), np.subtract(end, start)
+        found = cls(len(q))
+        found.coefficients = np.stack(
+            [q, 0.0 * q, 3.0 * moved / duration**2, -2.0 * moved / duration**3]
+        )
+        return found
+
 
 def cubic_motion(
     scene: Scene,
@@ -40,9 +50,10 @@ def cubic_motion(
     schemes: Sequence[str] = ("galerkin-2",) * 7,
     steps: Array | None = None,
     seed: int = 0,
+    cubic: Cubic | None = None,
 ) -> tuple[Trajectory, Cubic]:
     """A trajectory that is a cubic, and the cubic. `steps` are uniform by default."""
-    N, cubic = len(schemes), Cubic(scene.robot.nv, seed)
+    N, cubic = len(schemes), Cubic(scene.robot.nv, seed) if cubic is None else cubic
     steps = np.full(N, duration / N) if steps is None else steps
     grid = Grid(steps, tuple(by_name(name) for name in schemes))
     q, v, a = cubic(grid.t)

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import importlib
 import os
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hovi.checks.arguments import check_arguments_except
+from hovi.discrete.joined_motion import AnyMotion, joined
 from hovi.discrete.output.caution import warn_of_cautions
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError, nearest
@@ -25,12 +27,18 @@ class ExportFormat:
     name: on the command line. suffixes: file name extensions, the default one first.
     rate: samples per second by default. writer: module and function that writes it, imported when
         it is used.
+    of_samples: whether it holds samples alone, so that it takes several motions, joined.
+    has_suffix: whether files with its extensions are of this format if none is named.
+    options: names of what `export` takes for this format alone.
     """
 
     name: str
     suffixes: tuple[str, ...]
     rate: float
     writer: str
+    of_samples: bool = False
+    has_suffix: bool = True
+    options: tuple[str, ...] = ()
 
     @property
     def suffix(self) -> str:
@@ -38,15 +46,22 @@ class ExportFormat:
         return self.suffixes[0]
 
     def write(
-        self, trajectory: Trajectory, path: Path, rate: float | None = None, **options: Any
+        self, trajectory: AnyMotion, path: Path, rate: float | None = None, **options: Any
     ) -> None:
         """Write a motion, completely or not at all.
 
         rate: samples per second; that of the format when None. options: of the writer.
         Warns of a motion that its plan called no minimum, or in which links enter each other.
-        Raises InputError for an invalid rate and for a motion that the format cannot hold,
-        DisplayError when the file cannot be written or an optional library is missing.
+        Raises InputError for an invalid rate, for a motion that the format cannot hold and for
+        joined motions where it does not hold samples alone, DisplayError when the file cannot be
+        written or an optional library is missing.
         """
+        if not (self.of_samples or isinstance(trajectory, Trajectory)):
+            names = ", ".join(each.name for each in FORMATS if each.of_samples)
+            raise InputError(
+                f"the format {self.name!r} holds one motion: export each by itself, or join them "
+                f"in one of the formats {names}."
+            )
         warn_of_cautions(trajectory.metadata)
         module, name = self.writer.split(":")
         write = getattr(importlib.import_module(module), name)
@@ -55,20 +70,51 @@ class ExportFormat:
 
 _EXCHANGE = "hovi.exchange"
 FORMATS = (
-    ExportFormat("csv", (".csv",), 1000.0, "hovi.viewing.csv_table:write_csv"),
-    ExportFormat("numpy", (".npz",), 1000.0, f"{_EXCHANGE}.numpy_archive:write_numpy"),
+    ExportFormat("csv", (".csv",), 1000.0, "hovi.viewing.csv_table:write_csv", of_samples=True),
+    ExportFormat(
+        *("numpy", (".npz",), 1000.0, f"{_EXCHANGE}.numpy_archive:write_numpy"), of_samples=True
+    ),
     ExportFormat(
         "joint-trajectory",
         (".yaml", ".yml", ".json"),
         100.0,
         f"{_EXCHANGE}.joint_trajectory:write_joint_trajectory",
+        of_samples=True,
+        options=("efforts",),
+    ),
+    ExportFormat(
+        "robot-trajectory",
+        (".yaml", ".yml", ".json"),
+        100.0,
+        f"{_EXCHANGE}.robot_trajectory:write_robot_trajectory",
+        of_samples=True,
+        has_suffix=False,
+    ),
+    ExportFormat(
+        "urscript",
+        (".script",),
+        125.0,
+        f"{_EXCHANGE}.urscript:write_urscript",
+        of_samples=True,
+        options=("lookahead_time", "gain"),
+    ),
+    ExportFormat(
+        "franka",
+        (".csv",),
+        1000.0,
+        f"{_EXCHANGE}.franka_table:write_franka",
+        of_samples=True,
+        has_suffix=False,
     ),
     ExportFormat("mcap", (".mcap",), 100.0, f"{_EXCHANGE}.mcap_bag:write_mcap"),
     ExportFormat("mujoco", (".xml",), 50.0, f"{_EXCHANGE}.mujoco_keyframes:write_mujoco"),
     ExportFormat("rerun", (".rrd",), 100.0, f"{_EXCHANGE}.rerun_recording:write_rerun"),
     ExportFormat("video", (".mp4",), 30.0, f"{_EXCHANGE}.film.film:write_video"),
     ExportFormat("gif", (".gif",), 15.0, f"{_EXCHANGE}.film.film:write_gif"),
-    ExportFormat("parquet", (".parquet",), 1000.0, f"{_EXCHANGE}.parquet_table:write_parquet"),
+    ExportFormat(
+        *("parquet", (".parquet",), 1000.0, f"{_EXCHANGE}.parquet_table:write_parquet"),
+        of_samples=True,
+    ),
 )
 
 
@@ -82,7 +128,9 @@ def export_format(name: str) -> ExportFormat:
 
 def format_of_file(path: Path) -> ExportFormat:
     """The format of a file by its extension. Raises InputError for one of no format."""
-    by_suffix = {each: chosen for chosen in FORMATS for each in chosen.suffixes}
+    by_suffix = {
+        each: chosen for chosen in FORMATS if chosen.has_suffix for each in chosen.suffixes
+    }
     suffix = path.suffix.lower()
     if suffix not in by_suffix:
         raise InputError(
@@ -94,33 +142,54 @@ def format_of_file(path: Path) -> ExportFormat:
 
 @check_arguments_except("trajectory")
 def export(
-    trajectory: Trajectory | Solution,
+    trajectory: Trajectory | Solution | Sequence[Trajectory | Solution],
     path: str | os.PathLike[str],
     format: str | None = None,
     rate: float | None = None,
     *,
     efforts: bool = False,
+    gap: float = 0.0,
+    lookahead_time: float | None = None,
+    gain: float | None = None,
 ) -> None:
     """Write a motion in the file format of another program, completely or not at all.
 
-    path: the file. format: csv, numpy, joint-trajectory, parquet, mcap, mujoco, rerun, video or
-        gif; by the extension of the file when None.
+    trajectory: a motion, or several that follow each other at rest, for the formats of samples:
+        csv, numpy, parquet, joint-trajectory, robot-trajectory, urscript and franka.
+    path: the file. format: csv, numpy, joint-trajectory, robot-trajectory, urscript, franka,
+        parquet, mcap, mujoco, rerun, video or gif; by the extension of the file when None.
     rate: samples per second, or pictures of a film; that of the format when None.
     efforts: fill in the field `effort` of a joint-trajectory.
-    Raises InputError for an unknown format or extension, an invalid rate and a motion that the
-    format cannot hold, DisplayError when the file cannot be written or an optional library is
-    missing.
+    gap: time for which the robot rests between two motions, in [s].
+    lookahead_time, gain: of servoj in a urscript, 0.03 to 0.2 in [s] and 100 to 2000; 0.1 and 300
+        when None.
+    Raises InputError for an unknown format or extension, an invalid rate, a motion that the format
+    cannot hold, and motions that do not follow each other; DisplayError when the file cannot be
+    written or an optional library is missing.
     """
-    trajectory = motion_in(trajectory)
-    if format is None:
-        chosen = format_of_file(Path(path))
-    else:
-        chosen = export_format(format)
-        if Path(path).suffix.lower() not in chosen.suffixes:
-            raise InputError(
-                f"a file of the format {format!r} must end in {' or '.join(chosen.suffixes)}, not "
-                f"{Path(path).name!r}."
-            )
-    if efforts and chosen.name != "joint-trajectory":
-        raise InputError("`efforts` is for the format 'joint-trajectory'; the others have them.")
-    chosen.write(trajectory, Path(path), rate, **({"efforts": True} if efforts else {}))
+    given = trajectory if isinstance(trajectory, list | tuple) else [trajectory]
+    motions = [motion_in(each) for each in given]
+    if gap != 0 and len(motions) < 2:
+        raise InputError("a gap is between motions, and there is one: leave it out.")
+    chosen = _format(Path(path), format)
+    asked = {"lookahead_time": lookahead_time, "gain": gain, "efforts": efforts or None}
+    options = {key: value for key, value in asked.items() if value is not None}
+    for key in options:
+        if key not in chosen.options:
+            only = next(each.name for each in FORMATS if key in each.options)
+            more = "; the others have them" if key == "efforts" else ""
+            raise InputError(f"`{key}` is for the format {only!r}{more}: leave it out.")
+    chosen.write(joined(motions, gap), Path(path), rate, **options)
+
+
+def _format(path: Path, name: str | None) -> ExportFormat:
+    """The format of a name, or of a file's extension. Raises InputError."""
+    if name is None:
+        return format_of_file(path)
+    chosen = export_format(name)
+    if path.suffix.lower() not in chosen.suffixes:
+        raise InputError(
+            f"a file of the format {name!r} must end in {' or '.join(chosen.suffixes)}, not "
+            f"{path.name!r}."
+        )
+    return chosen

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from hovi.discrete.trajectory import Trajectory
+from hovi.discrete.joined_motion import AnyMotion
 from hovi.exchange.samples import times_of
 from hovi.system.dataclass import dataclass
 
@@ -32,7 +32,7 @@ class JointMotion:
     others: tuple[str, ...]
 
 
-def joint_motion(trajectory: Trajectory, rate: float) -> JointMotion:
+def joint_motion(trajectory: AnyMotion, rate: float) -> JointMotion:
     """Samples at multiples of 1/rate and at the end.
 
     rate: samples per second. Raises InputError for an invalid one.

@@ -11,8 +11,8 @@ import os
 from pathlib import Path
 from typing import Any
 
+from hovi.discrete.joined_motion import AnyMotion
 from hovi.discrete.output.caution import caution_lines
-from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError
 from hovi.exchange.joint_motion import joint_motion
 from hovi.exchange.whole_export import whole_export
@@ -21,7 +21,7 @@ NANO = 10**9
 
 
 def joint_trajectory(
-    trajectory: Trajectory, rate: float = 100.0, *, efforts: bool = False
+    trajectory: AnyMotion, rate: float = 100.0, *, efforts: bool = False
 ) -> dict[str, Any]:
     """The message trajectory_msgs/JointTrajectory as a dictionary of its fields.
 
@@ -63,7 +63,7 @@ def joint_trajectory(
 
 
 def write_joint_trajectory(
-    trajectory: Trajectory,
+    trajectory: AnyMotion,
     path: str | os.PathLike[str],
     rate: float = 100.0,
     *,
@@ -77,18 +77,18 @@ def write_joint_trajectory(
     message = joint_trajectory(trajectory, rate, efforts=efforts)
     as_json = Path(path).suffix.lower() == ".json"
     lines = (f"# {each}\n" for each in caution_lines([trajectory.metadata]))
-    text = json.dumps(message, indent=1) + "\n" if as_json else "".join(lines) + _yaml(message)
+    text = json.dumps(message, indent=1) + "\n" if as_json else "".join(lines) + as_yaml(message)
     with whole_export(path, "message") as stream:
         stream.write(text.encode())
 
 
-def _yaml(message: dict[str, Any]) -> str:
+def as_yaml(message: dict[str, Any]) -> str:
     """Block style with one line per field. A JSON string is one of YAML, too."""
     names = [json.dumps(name) for name in message["joint_names"]]
     lines = [
         "header: {stamp: {sec: 0, nanosec: 0}, frame_id: ''}",
         f"joint_names: [{', '.join(names)}]",
-        "points:",
+        "points:" if message["points"] else "points: []",
     ]
     for point in message["points"]:
         time = point["time_from_start"]

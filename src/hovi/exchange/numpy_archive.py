@@ -6,14 +6,14 @@ import os
 
 import numpy as np
 
+from hovi.discrete.joined_motion import AnyMotion
 from hovi.discrete.output.caution import caution_lines
-from hovi.discrete.trajectory import Trajectory
 from hovi.exchange.samples import times_of
 from hovi.exchange.whole_export import whole_export
 from hovi.viewing.csv_table import q_names
 
 
-def write_numpy(trajectory: Trajectory, path: str | os.PathLike[str], rate: float) -> None:
+def write_numpy(trajectory: AnyMotion, path: str | os.PathLike[str], rate: float) -> None:
     """Write t (M,), q (M, nq), positions, v, a and tau (M, nv), and the names of their columns.
 
     The arrays `q_names` and `names` hold the columns of q and of the others, and `cautions` those

@@ -5,15 +5,15 @@ from __future__ import annotations
 import json
 import os
 
+from hovi.discrete.joined_motion import AnyMotion
 from hovi.discrete.output.caution import caution_lines
-from hovi.discrete.trajectory import Trajectory
 from hovi.exchange.libraries import library
 from hovi.exchange.samples import times_of
 from hovi.exchange.whole_export import whole_export
 from hovi.viewing.csv_table import angle_indices, column_names
 
 
-def write_parquet(trajectory: Trajectory, path: str | os.PathLike[str], rate: float) -> None:
+def write_parquet(trajectory: AnyMotion, path: str | os.PathLike[str], rate: float) -> None:
     """Write one row per sample with the columns of the CSV table, as doubles.
 
     The metadata of the schema has the units, the motion's duration and its cautions, as JSON.

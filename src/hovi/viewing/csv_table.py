@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.checks.arguments import check_arguments_except
+from hovi.discrete.joined_motion import AnyMotion, JoinedMotion
 from hovi.discrete.trajectory import Sample, Trajectory
 from hovi.errors import DisplayError, InputError, expect
 from hovi.system.files import reason, whole_file
@@ -22,7 +23,7 @@ _ROWS_PER_BATCH = 10_000
 
 
 @check_arguments_except("trajectory")
-def write_csv(trajectory: Trajectory, path: str | os.PathLike[str], rate: float = 1000.0) -> None:
+def write_csv(trajectory: AnyMotion, path: str | os.PathLike[str], rate: float = 1000.0) -> None:
     """Write t, q, v, a and tau as comma-separated values in full precision, SI units.
 
     The first line names the columns: t, then q_, v_, a_ and tau_ with the coordinate's name; a
@@ -35,7 +36,8 @@ def write_csv(trajectory: Trajectory, path: str | os.PathLike[str], rate: float 
     rate: samples per second, positive.
     Raises InputError for an invalid rate, DisplayError when the file cannot be written.
     """
-    expect(trajectory, Trajectory, "the trajectory of a solution")
+    if not isinstance(trajectory, JoinedMotion):
+        expect(trajectory, Trajectory, "the trajectory of a solution")
     times = sample_times(trajectory.duration, rate)
     try:
         with whole_file(path) as stream:
@@ -67,13 +69,13 @@ def sample_times(duration: float, rate: float) -> Array:
     return np.append(earlier, duration)
 
 
-def q_names(trajectory: Trajectory) -> list[str]:
+def q_names(trajectory: AnyMotion) -> list[str]:
     """Names of the entries of q, (nq,)."""
     names = list(trajectory.coordinate_names)
     return names if trajectory.space is None else list(trajectory.space.names(names))
 
 
-def column_names(trajectory: Trajectory) -> list[str]:
+def column_names(trajectory: AnyMotion) -> list[str]:
     """Names of the columns t, q, v, a, tau and angle: the kind and the joint, as in q_elbow."""
     columns = ["t", *(f"q_{name}" for name in q_names(trajectory))]
     names, stored = trajectory.coordinate_names, trajectory.torque
@@ -83,19 +85,19 @@ def column_names(trajectory: Trajectory) -> list[str]:
     return columns + [f"angle_{names[i]}" for i in angle_indices(trajectory)]
 
 
-def angle_indices(trajectory: Trajectory) -> list[int]:
+def angle_indices(trajectory: AnyMotion) -> list[int]:
     """Indices in v of the continuous joints."""
     space = trajectory.space
     return [] if space is None else [factor.v.start for factor in space.angles]
 
 
-def _header(trajectory: Trajectory) -> str:
+def _header(trajectory: AnyMotion) -> str:
     """The first line; commas and quotes in names become underscores."""
     names = (each.replace(",", "_").replace('"', "_") for each in column_names(trajectory))
     return ",".join(names) + "\n"
 
 
-def _batches(trajectory: Trajectory, times: Array) -> Iterator[tuple[Array, Sample]]:
+def _batches(trajectory: AnyMotion, times: Array) -> Iterator[tuple[Array, Sample]]:
     for start in range(0, len(times), _ROWS_PER_BATCH):
         t = times[start : start + _ROWS_PER_BATCH]
         yield t, trajectory.sample(t)

@@ -1,9 +1,9 @@
-"""`hovi export`: a motion in the file format of another program."""
+"""`hovi export`: a motion, or several as one, in the file format of another program."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -32,19 +32,37 @@ def export(
     rate: Annotated[
         float | None, typer.Option(help="Samples per second; default: that of the format.")
     ] = None,
+    then: Annotated[
+        list[Path] | None,
+        typer.Option(metavar="FILE.npz", help="A motion that follows; may be repeated."),
+    ] = None,
+    gap: Annotated[
+        float, typer.Option(help="Seconds for which the robot rests between motions.")
+    ] = 0.0,
+    lookahead_time: Annotated[
+        float | None, typer.Option(help="Of servoj in a urscript, 0.03 to 0.2 s; default 0.1.")
+    ] = None,
+    gain: Annotated[
+        float | None, typer.Option(help="Of servoj in a urscript, 100 to 2000; default 300.")
+    ] = None,
     package_dir: PackageDirs = None,
 ) -> None:
-    """Export a motion for other programs.
+    """Export a motion for other programs, or several as one.
 
-    Formats: csv, numpy, parquet, joint-trajectory, mcap, mujoco, rerun, video, gif.
+    Formats: csv, numpy, parquet, joint-trajectory, robot-trajectory, urscript, franka, mcap,
+    mujoco, rerun, video, gif.
     """
     from hovi.cli.arguments.files import check_output, load_shown
+    from hovi.exchange.formats import export as write
 
-    given = _output(positional, out)
+    given, files = _output(positional, out), [file, *(then or [])]
     chosen = _format(format_, csv, given)
-    target = check_output(given or _beside(file, chosen.suffix), *chosen.suffixes)
-    _require_other_file(target, file)
-    chosen.write(load_shown(file, package_dir), target, rate)
+    target = check_output(given or _beside(file, chosen), *chosen.suffixes)
+    for each in files:
+        _require_other_file(target, each)
+    motions = [load_shown(each, package_dir) for each in files]
+    options: dict[str, Any] = {"lookahead_time": lookahead_time, "gain": gain}
+    write(motions, target, chosen.name, rate, gap=gap, **options)
     print(f"wrote {target}")
 
 
@@ -63,12 +81,14 @@ def _format(name: str | None, csv: bool, out: Path | None) -> ExportFormat:
     raise InputError(f"no export format was given; use --format with one of {names}.")
 
 
-def _beside(file: Path, suffix: str) -> Path:
-    """The file with another extension, and another name where it has that one itself."""
+def _beside(file: Path, chosen: ExportFormat) -> Path:
+    """The file with another extension, and another name where that says another format."""
     from hovi.cli.arguments.files import next_to
 
-    other = next_to(file, suffix)
-    return file.with_name(f"{file.stem}_samples{suffix}") if other == file else other
+    other = next_to(file, chosen.suffix)
+    if not chosen.has_suffix:
+        return file.with_name(f"{file.stem}_{chosen.name.replace('-', '_')}{chosen.suffix}")
+    return file.with_name(f"{file.stem}_samples{chosen.suffix}") if other == file else other
 
 
 def _require_other_file(target: Path, file: Path) -> None:

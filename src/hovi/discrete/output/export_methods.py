@@ -40,6 +40,29 @@ class ExportMethods:
         """
         exported(self, path, "joint-trajectory", rate, **({"efforts": True} if efforts else {}))
 
+    def to_robot_trajectory(self, path: Path, rate: float | None = None) -> None:
+        """Write MoveIt's moveit_msgs/RobotTrajectory, as YAML or JSON by the extension."""
+        exported(self, path, "robot-trajectory", rate)
+
+    def to_urscript(
+        self,
+        path: Path,
+        rate: float | None = None,
+        *,
+        lookahead_time: float | None = None,
+        gain: float | None = None,
+    ) -> None:
+        """Write a URScript program for an arm of Universal Robots, a target per sample.
+
+        lookahead_time: of servoj, 0.03 to 0.2, in [s]; 0.1 when None. gain: of servoj, 100 to 2000;
+        300 when None.
+        """
+        exported(self, path, "urscript", rate, lookahead_time=lookahead_time, gain=gain)
+
+    def to_franka(self, path: Path, rate: float | None = None) -> None:
+        """Write the table of seven joints per millisecond that libfranka's example reads."""
+        exported(self, path, "franka", rate)
+
     def to_mcap(self, path: Path, rate: float | None = None) -> None:
         """Write an MCAP file of ROS 2 messages: joint states, efforts, TF and the URDF."""
         exported(self, path, "mcap", rate)

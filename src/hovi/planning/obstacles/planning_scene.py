@@ -15,6 +15,7 @@ from hovi.planning.obstacles.mesh import ConvexParts, parts_of
 from hovi.planning.obstacles.obstacle import Obstacle
 from hovi.planning.obstacles.primitives import Box, Cylinder, Sphere
 from hovi.planning.obstacles.triangle_mesh import TriangleMesh
+from hovi.planning.obstacles.yaml_poses import pose_in, vector_in
 from hovi.planning.obstacles.yaml_text import YamlNode, read_yaml
 from hovi.system.dataclass import dataclass
 
@@ -33,8 +34,6 @@ _DIMENSIONS = {"box": 3, "sphere": 1, "cylinder": 2}
 """Number of lengths of each primitive."""
 MAX_INDEX = 1e9
 """Largest number of a vertex."""
-UNIT_TOLERANCE = 1e-3
-"""Largest deviation of a quaternion's length from 1."""
 MAX_OBJECTS = 1_000
 """Maximum number of objects of a scene."""
 
@@ -91,7 +90,7 @@ def _obstacles(node: YamlNode, frame: pin.SE3, convex_parts: bool) -> Iterator[O
         raise operation.error("`operation` must be 0 or ADD in a scene that stands by itself")
     if planes is not None and planes.items():
         raise planes.error("planes have no inside: use an obstacle of kind 'half_space' instead")
-    at = frame if keys.get("pose") is None else frame * _pose(keys.need("pose"))
+    at = frame if keys.get("pose") is None else frame * pose_in(keys.need("pose"))
     placed = list(_placed(keys.get("primitives"), keys.get("primitive_poses"), at))
     meshes = list(_placed(keys.get("meshes"), keys.get("mesh_poses"), at))
     if not placed + meshes:
@@ -116,7 +115,7 @@ def _placed(
     if len(nodes) != len(given) and shapes is not None:
         raise shapes.error(f"{len(nodes)} shapes need as many poses, got {len(given)}")
     for node, pose in zip(nodes, given, strict=True):
-        yield node, at * _pose(pose)
+        yield node, at * pose_in(pose)
 
 
 def _primitive(placed: _Placed) -> Obstacle:
@@ -142,7 +141,7 @@ def _primitive(placed: _Placed) -> Obstacle:
 
 def _mesh(placed: _Placed, convex_parts: bool) -> Obstacle:
     keys = placed.node.mapping("vertices", "triangles")
-    vertices = np.array([_vector(each) for each in keys.need("vertices").items()]).reshape(-1, 3)
+    vertices = np.array([vector_in(each) for each in keys.need("vertices").items()]).reshape(-1, 3)
     triangles = np.array([_corners(each) for each in keys.need("triangles").items()])
     triangles = triangles.astype(np.int64).reshape(-1, 3)
     if triangles.size and not (triangles.min() >= 0 and triangles.max() < len(vertices)):
@@ -159,33 +158,6 @@ def _corners(node: YamlNode) -> list[float]:
     numbers = [each.number() for each in nodes]
     if len(numbers) != 3 or any(x != int(x) or abs(x) > MAX_INDEX for x in numbers):
         raise node.error("a triangle must have three whole numbers")
-    return numbers
-
-
-def _pose(node: YamlNode) -> pin.SE3:
-    """A pose; without an orientation, or with one of zeros, it is not turned."""
-    keys = node.mapping("position", "orientation")
-    at, turn = keys.get("position"), keys.get("orientation")
-    position = np.zeros(3) if at is None else np.array(_vector(at))
-    xyzw = np.zeros(4) if turn is None else np.array(_vector(turn, "xyzw"))
-    length = float(np.linalg.norm(xyzw))
-    if length == 0.0:
-        return pin.SE3(np.eye(3), position)
-    if turn is not None and not abs(length - 1.0) < UNIT_TOLERANCE:
-        raise turn.error(f"`orientation` must be a unit quaternion, but its length is {length:.4g}")
-    x, y, z, w = xyzw / length
-    return pin.SE3(pin.Quaternion(w, x, y, z).matrix(), position)
-
-
-def _vector(node: YamlNode, names: str = "xyz") -> list[float]:
-    """Numbers as a list, or by their names, of which missing ones are 0."""
-    if node.is_mapping:
-        keys = node.mapping(*names)
-        given = [keys.get(name) for name in names]
-        return [0.0 if each is None else each.number() for each in given]
-    numbers = [each.number() for each in node.items()]
-    if len(numbers) != len(names):
-        raise node.error(f"expected the {len(names)} numbers {', '.join(names)}")
     return numbers
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -116,12 +117,13 @@ class YamlMapping:
 
 
 def read_yaml(path: Path) -> YamlNode:
-    """The value of a file with one document.
+    """The value of a file with one document; a line "---" after it, as `ros2 topic echo` prints, is
+    left out.
 
     Raises SceneError for a file that cannot be read, is no YAML, or refers to itself (anchors).
     """
     yaml = _library(path)
-    text = _text(path)
+    text = re.sub(r"\n---\s*\Z", "\n", _text(path))
     loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
     try:
         _require_simple(yaml.parse(text, Loader=loader), path, yaml)
