@@ -278,6 +278,25 @@ def test_a_line_at_a_limit_has_the_color_of_its_joint_unless_it_is_that_of_all(
 
 
 @needs_chromium
+def test_curves_of_eighteen_joints_differ_and_look_as_next_to_their_names(
+    other_tab: Tab, tmp_path: Path
+) -> None:
+    (tmp_path / "arm.urdf").write_text(chain(18))
+    arm = load_robot(tmp_path / "arm.urdf")
+    replay(cubic_motion(Scene(arm, [Gravity(9.81)]))[0], html=tmp_path / "arm.html")
+    other_tab.open((tmp_path / "arm.html").as_uri())
+    other_tab.until("viewer.animator.actions.length > 0")
+    looks = (
+        "[...document.querySelectorAll('{}')].map(path => [getComputedStyle(path).stroke,"
+        " getComputedStyle(path).strokeDasharray.split(',').length,"
+        " parseFloat(getComputedStyle(path).strokeDasharray) > 4])"
+    )
+    curves = other_tab.value(looks.format("#torque .curve"))
+    assert len({tuple(each) for each in curves}) == len(curves) == 18
+    assert other_tab.value(looks.format(".joint path")) == curves
+
+
+@needs_chromium
 def test_frames_follow_the_joints(motion: Trajectory, tab: Tab) -> None:
     press(tab, "frames")
     t = 0.5 * motion.duration
