@@ -25,6 +25,7 @@ import pytest
 from hovi.discrete.trajectory import Trajectory
 from hovi.effects import Gravity, Payload
 from hovi.errors import InputError
+from hovi.exchange.film.shot import VIEWS
 from hovi.planning.problem.limits import as_limits
 from hovi.robot.loading import load_robot
 from hovi.robot.robot import Robot
@@ -294,6 +295,48 @@ def test_curves_of_eighteen_joints_differ_and_look_as_next_to_their_names(
     curves = other_tab.value(looks.format("#torque .curve"))
     assert len({tuple(each) for each in curves}) == len(curves) == 18
     assert other_tab.value(looks.format(".joint path")) == curves
+
+
+NDC = (
+    "(p => new MeshCat.THREE.Vector3(...p.map((x, i) => x + PANEL.shift[i]))"
+    ".applyMatrix4(viewer.scene.matrixWorld).project(viewer.camera).toArray())({})"
+)
+"""Where a point of the world is in the picture, from -1 to 1 in both directions."""
+
+
+@needs_chromium
+def test_a_camera_stands_where_it_is_put_and_looks_at_its_target(tab: Tab) -> None:
+    position, target, above = [1.0, -2.0, 1.5], [0.2, 0.3, 0.1], [0.2, 0.3, 0.4]
+    tab.value(f"stage.stand({position}, {target}); viewer.render(); 1")
+    at = tab.value(
+        "[viewer.camera.position.x, -viewer.camera.position.z, viewer.camera.position.y]"
+    )
+    shift = np.array(tab.value("PANEL.shift"))
+    np.testing.assert_allclose(np.array(at) - shift, position, atol=1e-6)
+    np.testing.assert_allclose(tab.value(NDC.format(target))[:2], [0.0, 0.0], atol=1e-5)
+    x, y, _ = tab.value(NDC.format(above))
+    assert abs(x) < 1e-5
+    assert y > 0.05
+    tab.value("stage.resize(); viewer.render(); 1")
+    np.testing.assert_allclose(tab.value(NDC.format(target))[:2], [0.0, 0.0], atol=1e-5)
+    tab.value("stage.turned = false; stage.look(); 1")
+
+
+@needs_chromium
+@pytest.mark.parametrize("view", VIEWS)
+def test_a_view_shows_all_of_the_motion_from_its_side(tab: Tab, view: str) -> None:
+    before = tab.value("PANEL.view")
+    tab.value(f"stage.look_from({list(VIEWS[view])}); viewer.render(); 1")
+    camera = tab.value(
+        "[viewer.camera.position.x, -viewer.camera.position.z, viewer.camera.position.y]"
+    )
+    toward = np.array(camera) / np.linalg.norm(camera)
+    np.testing.assert_allclose(toward, VIEWS[view] / np.linalg.norm(VIEWS[view]), atol=1e-5)
+    places = tab.value("PANEL.joints.flatMap(joint => joint.at.map(pose => pose.slice(0, 3)))")
+    seen = np.array([tab.value(NDC.format(place)) for place in places[:: len(places) // 20]])
+    assert (np.abs(seen[:, :2]) <= 1.0).all()
+    assert np.abs(seen[:, :2]).max() > 0.3
+    tab.value(f"stage.look_from({before}); viewer.render(); 1")
 
 
 @needs_chromium

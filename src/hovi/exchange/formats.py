@@ -7,6 +7,8 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy.typing as npt
+
 from hovi.checks.arguments import check_arguments_except
 from hovi.discrete.output.caution import warn_of_cautions
 from hovi.discrete.trajectory import Trajectory
@@ -71,6 +73,9 @@ FORMATS = (
     ExportFormat("parquet", (".parquet",), 1000.0, f"{_EXCHANGE}.parquet_table:write_parquet"),
 )
 
+FILMS = ("video", "gif")
+"""The formats that have a size, a camera and a speed."""
+
 
 def export_format(name: str) -> ExportFormat:
     """The format with this name. Raises InputError for an unknown name."""
@@ -92,7 +97,7 @@ def format_of_file(path: Path) -> ExportFormat:
     return by_suffix[suffix]
 
 
-@check_arguments_except("trajectory")
+@check_arguments_except("trajectory", "size", "camera", "speed")
 def export(
     trajectory: Trajectory | Solution,
     path: str | os.PathLike[str],
@@ -100,6 +105,9 @@ def export(
     rate: float | None = None,
     *,
     efforts: bool = False,
+    size: str | tuple[int, int] | None = None,
+    camera: str | npt.ArrayLike | None = None,
+    speed: float | None = None,
 ) -> None:
     """Write a motion in the file format of another program, completely or not at all.
 
@@ -107,6 +115,9 @@ def export(
         gif; by the extension of the file when None.
     rate: samples per second, or pictures of a film; that of the format when None.
     efforts: fill in the field `effort` of a joint-trajectory.
+    size, camera, speed: of a film: width and height up to 1920x1080; a view (front, side, top, iso)
+        or the position of the camera in [m], perhaps with the point that it looks at; seconds of
+        the motion per second.
     Raises InputError for an unknown format or extension, an invalid rate and a motion that the
     format cannot hold, DisplayError when the file cannot be written or an optional library is
     missing.
@@ -123,4 +134,17 @@ def export(
             )
     if efforts and chosen.name != "joint-trajectory":
         raise InputError("`efforts` is for the format 'joint-trajectory'; the others have them.")
-    chosen.write(trajectory, Path(path), rate, **({"efforts": True} if efforts else {}))
+    film = film_options(chosen, size, camera, speed)
+    chosen.write(trajectory, Path(path), rate, **({"efforts": True} if efforts else {}), **film)
+
+
+def film_options(chosen: ExportFormat, size: Any, camera: Any, speed: Any) -> dict[str, Any]:
+    """What is given of how a film is made. Raises InputError for a format that is no film."""
+    options = {"size": size, "camera": camera, "speed": speed}
+    given = {key: value for key, value in options.items() if value is not None}
+    if given and chosen.name not in FILMS:
+        raise InputError(
+            f"`{next(iter(given))}` is for the formats {' and '.join(FILMS)}, not {chosen.name!r}: "
+            "leave it out."
+        )
+    return given

@@ -311,8 +311,8 @@ def _lines(
     for i in members:
         style = curve_style(int(i))
         color, line = style.color, np.hstack([y[:, :, i], gap]).ravel()
-        drawn = {"color": color, "linestyle": style.line, "linewidth": 1.4}
-        ax.plot(broken, line, label=names[i] + side, **drawn)
+        (drawn,) = ax.plot(broken, line, color=color, linewidth=1.4, label=names[i] + side)
+        drawn.set_linestyle(style.line)
         if len(t) <= _MAX_MARKED_INTERVALS:
             ends = np.s_[:, [0, -1]]
             ax.plot(t[ends].ravel(), y[:, :, i][ends].ravel(), ".", color=color, markersize=3)

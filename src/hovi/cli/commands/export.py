@@ -32,6 +32,17 @@ def export(
     rate: Annotated[
         float | None, typer.Option(help="Samples per second; default: that of the format.")
     ] = None,
+    size: Annotated[
+        str | None, typer.Option(metavar="WIDTHxHEIGHT", help="Pixels of a film, up to 1920x1080.")
+    ] = None,
+    camera: Annotated[
+        str | None,
+        typer.Option(
+            metavar="VIEW|X,Y,Z[:X,Y,Z]",
+            help="Of a film: front, side, top, iso, or its position and what it looks at, in m.",
+        ),
+    ] = None,
+    speed: Annotated[float | None, typer.Option(help="Of a film; 1 is real time.")] = None,
     package_dir: PackageDirs = None,
 ) -> None:
     """Export a motion for other programs.
@@ -39,12 +50,14 @@ def export(
     Formats: csv, numpy, parquet, joint-trajectory, mcap, mujoco, rerun, video, gif.
     """
     from hovi.cli.arguments.files import check_output, load_shown
+    from hovi.exchange.formats import film_options
 
     given = _output(positional, out)
     chosen = _format(format_, csv, given)
     target = check_output(given or _beside(file, chosen.suffix), *chosen.suffixes)
     _require_other_file(target, file)
-    chosen.write(load_shown(file, package_dir), target, rate)
+    film = film_options(chosen, size, camera, speed)
+    chosen.write(load_shown(file, package_dir), target, rate, **film)
     print(f"wrote {target}")
 
 

@@ -217,6 +217,29 @@ class Stage {
         if (!this.turned) { this.look(); }
     }
 
+    // The camera in a direction of the world's frame, as near as the motion allows.
+    look_from(direction) {
+        this.panel.view = direction;
+        this.turned = false;
+        this.look();
+    }
+
+    // The camera at a point of the world's frame, looking at another one: the middle for null.
+    stand(position, target) {
+        const T = this.THREE, camera = this.viewer.camera, shift = new T.Vector3(...this.panel.shift);
+        const page = p => { const q = new T.Vector3(...p).add(shift); return new T.Vector3(q.x, q.z, -q.y); };
+        this.turned = true;
+        camera.fov = 32;
+        camera.position.copy(page(position));
+        this.viewer.controls.target.copy(target === null ? new T.Vector3() : page(target));
+        const distance = camera.position.distanceTo(this.viewer.controls.target);
+        camera.near = Math.min(0.01 * distance, 0.1);
+        camera.far = 20 * Math.max(distance, this.panel.size);
+        this.viewer.controls.update();
+        camera.updateProjectionMatrix();
+        this.viewer.set_dirty();
+    }
+
     // The camera as near as the box that the motion sweeps allows, in a window of any shape.
     look() {
         const T = this.THREE, camera = this.viewer.camera, panel = this.panel;
