@@ -207,7 +207,7 @@ class Controls {
         this.rows = panel.names.map((name, i) => {
             const sample = drawing("svg", { class: "sample", viewBox: "0 0 20 10" });
             sample.append(drawing("path", { d: "M0 5 H20", ...this.style(i, 1.4) }));
-            const label = element("span", { class: "joint label", title: name }, sample, brief(name));
+            const label = element("span", { class: "joint label", title: name }, sample, element("span", { text: brief(name) }));
             label.onclick = () => this.only(i);
             const rounding = 1e-9 * Math.max(...panel.tau[i].map(Math.abs));
             const scale = panel.angular[i] ? 180 / Math.PI : 1;
