@@ -60,7 +60,7 @@ def page(size: tuple[int, int], motion: hovi.Trajectory, *others: hovi.Trajector
             metrics = {"deviceScaleFactor": 1, "mobile": width < 500}
             tab.call("Emulation.setDeviceMetricsOverride", width=width, height=height, **metrics)
             tab.open(file.as_uri())
-            tab.until("viewer.animator.actions.length > 0")
+            tab.until("typeof viewer == 'object' && viewer.animator.actions.length > 0")
             time.sleep(2.0)  # meshes are read one after another
             yield tab
 
