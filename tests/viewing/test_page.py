@@ -20,6 +20,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+import pinocchio as pin
 import pytest
 
 from hovi.discrete.trajectory import Trajectory
@@ -337,6 +338,30 @@ def test_a_view_shows_all_of_the_motion_from_its_side(tab: Tab, view: str) -> No
     assert (np.abs(seen[:, :2]) <= 1.0).all()
     assert np.abs(seen[:, :2]).max() > 0.3
     tab.value(f"stage.look_from({before}); viewer.render(); 1")
+
+
+@needs_chromium
+def test_frames_of_the_tip_are_drawn_at_the_start_and_at_the_goal(
+    motion: Trajectory, tab: Tab
+) -> None:
+    robot = motion.robot
+    assert robot is not None
+    ends = "stage.node(['Ends']).children.map(end => end.children[0])"
+    for k, (position, quaternion) in enumerate(
+        tab.value(f"{ends}.map(x => [x.position.toArray(), x.quaternion.toArray()])")
+    ):
+        pose = robot.frame_pose(robot.tip_frame, motion.q[-k])
+        np.testing.assert_allclose(position, pose[:3, 3], atol=1e-5)
+        turned = pin.Quaternion(np.array(quaternion)).matrix()
+        np.testing.assert_allclose(turned, pose[:3, :3], atol=1e-4)
+    assert tab.value(f"{ends}.length") == 2
+    seek(tab, 0.5 * motion.duration)
+    shown = tab.screenshot()
+    press(tab, "ends", on=False)
+    seek(tab, 0.5 * motion.duration)
+    changed = np.abs(tab.screenshot() - shown).max(axis=2) > 30
+    press(tab, "ends")
+    assert 1e-4 < changed.mean() < 0.05
 
 
 @needs_chromium

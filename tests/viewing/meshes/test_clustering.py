@@ -56,7 +56,7 @@ def test_neither_surface_is_farther_from_the_other_than_allowed(n: int, noise: f
 
 
 def test_no_vertex_moves_by_more_than_the_deviation() -> None:
-    """Where a cell has nearly all of its vertices in one corner, and one in the opposite one, too."""
+    """Where a cell has most of its vertices in one corner, and one in the opposite one, too."""
     rng = np.random.default_rng(3)
     corner = np.repeat(np.floor(rng.uniform(0, 50, (800, 3))), 5, axis=0)
     corner += np.where(np.arange(4000) % 5 == 0, 0.98, 0.01)[:, None]

@@ -90,6 +90,7 @@ class Controls {
         this.loop = this.chip("Loop", on => this.repeat(on));
         if (panel.trace) { this.chip("Path", on => this.visible("trace", on), true); }
         if (panel.joints.length > 0) {
+            this.chip("Ends", on => { this.viewer.set_property(["Ends"], "visible", on); this.viewer.set_dirty(); }, true);
             this.chip("Names", on => this.marked("names", on));
             this.chip("Frames", on => this.marked("frames", on));
         }

@@ -165,7 +165,7 @@ def joints_of(
         poses[-1] += [_pose(data.oMf[tip]) for tip in tips]
     tracks = np.swapaxes(np.array(poses), 0, 1)  # (joints + tips, M, 7)
     described = [_joint(model, j, robot, limits) for j in range(1, model.njoints)]
-    described += [{"name": name, "axis": None} for name in robot.tip_frames]
+    described += [{"name": name, "axis": None, "tip": True} for name in robot.tip_frames]
     pairs = list(zip(described, tracks, strict=True))
     return tuple({**each, "at": _rounded(track)} for each, track in pairs[:_MAX_JOINTS])
 
