@@ -190,6 +190,7 @@ class DemoServer:
             ]
         )
         self._server.add_socket(listener)  # type: ignore[arg-type]
+        self.page(MOTIONS[0].scene)  # before a browser asks for it
 
     def _run(self) -> None:
         asyncio.set_event_loop(self._loop)
