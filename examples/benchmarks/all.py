@@ -43,6 +43,7 @@ SCRIPTS = (
     "example_robots",
     "manifold_points",
     "inverse_kinematics",
+    "pages",
 )
 
 PEER = [f"--peer={os.environ['TASKS_PEER']}"] if "TASKS_PEER" in os.environ else []

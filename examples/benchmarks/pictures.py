@@ -15,6 +15,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import hovi
+from hovi.viewing.documents.demo import FIRST, MOTIONS
 
 TOP = Path(__file__).resolve().parents[2]
 IMAGES = TOP / "docs" / "images"
@@ -24,7 +25,7 @@ from PIL import Image  # noqa: E402
 
 from oracles.headless_browser import Tab, headless_browser  # noqa: E402
 
-DESKTOP, PHONE, MOVING = (1280, 800), (390, 844), (560, 350)
+DESKTOP, PHONE, MOVING, MENU = (1280, 800), (390, 844), (560, 350), (640, 360)
 FRAMES_PER_SECOND, HOLD = 16, 0.9
 COLORS = 96
 ACCENTS = ("#cc78a6", "#d08fb2", "#f0d000", "#0072b2", "#d55e00")
@@ -55,12 +56,12 @@ def page(size: tuple[int, int], motion: hovi.Trajectory, *others: hovi.Trajector
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "page.html"
         hovi.replay(motion, compare=others, html=file)
-        with headless_browser(Path(folder) / "profile", size) as tab:
+        with headless_browser(size) as tab:
             width, height = size
             metrics = {"deviceScaleFactor": 1, "mobile": width < 500}
             tab.call("Emulation.setDeviceMetricsOverride", width=width, height=height, **metrics)
             tab.open(file.as_uri())
-            tab.until("viewer.animator.actions.length > 0")
+            tab.until("typeof viewer == 'object' && viewer.animator.actions.length > 0")
             time.sleep(2.0)  # meshes are read one after another
             yield tab
 
@@ -112,10 +113,24 @@ def in_common_colors(frames: list[Image.Image]) -> list[Image.Image]:
     return [each.quantize(palette=palette, dither=Image.Dither.NONE) for each in frames]
 
 
+def menu() -> None:
+    """The pictures of `hovi demo`, and the motion that it shows first, which are part of hovi."""
+    for number, each in enumerate(MOTIONS):
+        motion = planned(each.scene)
+        if number == 0:
+            motion.save(FIRST)
+        with page(MENU, motion) as tab:
+            tab.value("document.body.classList.add('bare'); stage.resize(); 1")
+            seek(tab, 0.55 * motion.duration)
+            picture = Image.fromarray(tab.screenshot().astype("uint8"))
+        picture.resize((MENU[0] // 2, MENU[1] // 2)).save(each.picture, "JPEG", quality=82)
+
+
 PICTURES: dict[str, Callable[[], None]] = {
     "first": lambda: moving(first_motion(), "first_motion.gif"),
     "swing": lambda: moving(swing_up(), "swing_up.gif", speed=2.0),
     "desktop": lambda: still(DESKTOP, [first_motion()], "replay.png"),
+    "menu": menu,
     "phone": lambda: still(PHONE, [first_motion()], "replay_phone.png", "names"),
     "ghosts": lambda: still(
         DESKTOP,

@@ -5,20 +5,18 @@ What they hold is known as plain numbers: see tests/data/write_motions.py, which
 
 from __future__ import annotations
 
-import base64
 import csv
 import json
-import re
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
 import pytest
-import umsgpack
 
 import hovi
 from data.write_motions import MOTIONS, STEPS
+from oracles.offline_pages import messages_of
 
 DATA = Path(__file__).resolve().parents[1] / "data"
 NUMBERS: dict[str, dict[str, Any]] = json.loads((DATA / "samples.json").read_text())
@@ -205,10 +203,7 @@ def test_a_page_shows_a_loaded_motion(name: str, tmp_path: Path) -> None:
     motion, numbers = loaded(name), known(name)
     assert motion.robot is not None
     hovi.replay(motion, html=tmp_path / "page.html")
-    text = (tmp_path / "page.html").read_text()
-    found = re.search(r"for \(const message of (\[.*\])\)", text)
-    assert found is not None
-    messages = [umsgpack.unpackb(base64.b64decode(m)) for m in json.loads(found[1])]
+    messages = messages_of((tmp_path / "page.html").read_text())
     (drawn,) = (m for m in messages if "trace" in m["path"])
     data = drawn["object"]["geometries"][0]["data"]["attributes"]["position"]["array"]
     path = np.frombuffer(data.data, np.float32).reshape(-1, 3)

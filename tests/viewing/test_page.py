@@ -20,11 +20,13 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+import pinocchio as pin
 import pytest
 
 from hovi.discrete.trajectory import Trajectory
 from hovi.effects import Gravity, Payload
 from hovi.errors import InputError
+from hovi.exchange.film.shot import VIEWS
 from hovi.planning.problem.limits import as_limits
 from hovi.robot.loading import load_robot
 from hovi.robot.robot import Robot
@@ -275,6 +277,91 @@ def test_a_line_at_a_limit_has_the_color_of_its_joint_unless_it_is_that_of_all(
     assert all(same for _, same in lines)
     shared = "[...document.querySelectorAll('#velocity .limit')].map(line => line.dataset.joint)"
     assert other_tab.value(f"{shared}.map(joint => joint === undefined)") == [True, True]
+
+
+@needs_chromium
+def test_curves_of_eighteen_joints_differ_and_look_as_next_to_their_names(
+    other_tab: Tab, tmp_path: Path
+) -> None:
+    (tmp_path / "arm.urdf").write_text(chain(18))
+    arm = load_robot(tmp_path / "arm.urdf")
+    replay(cubic_motion(Scene(arm, [Gravity(9.81)]))[0], html=tmp_path / "arm.html")
+    other_tab.open((tmp_path / "arm.html").as_uri())
+    other_tab.until("viewer.animator.actions.length > 0")
+    looks = (
+        "[...document.querySelectorAll('{}')].map(path => [getComputedStyle(path).stroke,"
+        " getComputedStyle(path).strokeDasharray.split(',').length,"
+        " parseFloat(getComputedStyle(path).strokeDasharray) > 4])"
+    )
+    curves = other_tab.value(looks.format("#torque .curve"))
+    assert len({tuple(each) for each in curves}) == len(curves) == 18
+    assert other_tab.value(looks.format(".joint path")) == curves
+
+
+NDC = (
+    "(p => new MeshCat.THREE.Vector3(...p.map((x, i) => x + PANEL.shift[i]))"
+    ".applyMatrix4(viewer.scene.matrixWorld).project(viewer.camera).toArray())({})"
+)
+"""Where a point of the world is in the picture, from -1 to 1 in both directions."""
+
+
+@needs_chromium
+def test_a_camera_stands_where_it_is_put_and_looks_at_its_target(tab: Tab) -> None:
+    position, target, above = [1.0, -2.0, 1.5], [0.2, 0.3, 0.1], [0.2, 0.3, 0.4]
+    tab.value(f"stage.stand({position}, {target}); viewer.render(); 1")
+    at = tab.value(
+        "[viewer.camera.position.x, -viewer.camera.position.z, viewer.camera.position.y]"
+    )
+    shift = np.array(tab.value("PANEL.shift"))
+    np.testing.assert_allclose(np.array(at) - shift, position, atol=1e-6)
+    np.testing.assert_allclose(tab.value(NDC.format(target))[:2], [0.0, 0.0], atol=1e-5)
+    x, y, _ = tab.value(NDC.format(above))
+    assert abs(x) < 1e-5
+    assert y > 0.05
+    tab.value("stage.resize(); viewer.render(); 1")
+    np.testing.assert_allclose(tab.value(NDC.format(target))[:2], [0.0, 0.0], atol=1e-5)
+    tab.value("stage.turned = false; stage.look(); 1")
+
+
+@needs_chromium
+@pytest.mark.parametrize("view", VIEWS)
+def test_a_view_shows_all_of_the_motion_from_its_side(tab: Tab, view: str) -> None:
+    before = tab.value("PANEL.view")
+    tab.value(f"stage.look_from({list(VIEWS[view])}); viewer.render(); 1")
+    camera = tab.value(
+        "[viewer.camera.position.x, -viewer.camera.position.z, viewer.camera.position.y]"
+    )
+    toward = np.array(camera) / np.linalg.norm(camera)
+    np.testing.assert_allclose(toward, VIEWS[view] / np.linalg.norm(VIEWS[view]), atol=1e-5)
+    places = tab.value("PANEL.joints.flatMap(joint => joint.at.map(pose => pose.slice(0, 3)))")
+    seen = np.array([tab.value(NDC.format(place)) for place in places[:: len(places) // 20]])
+    assert (np.abs(seen[:, :2]) <= 1.0).all()
+    assert np.abs(seen[:, :2]).max() > 0.3
+    tab.value(f"stage.look_from({before}); viewer.render(); 1")
+
+
+@needs_chromium
+def test_frames_of_the_tip_are_drawn_at_the_start_and_at_the_goal(
+    motion: Trajectory, tab: Tab
+) -> None:
+    robot = motion.robot
+    assert robot is not None
+    ends = "stage.node(['Ends']).children.map(end => end.children[0])"
+    for k, (position, quaternion) in enumerate(
+        tab.value(f"{ends}.map(x => [x.position.toArray(), x.quaternion.toArray()])")
+    ):
+        pose = robot.frame_pose(robot.tip_frame, motion.q[-k])
+        np.testing.assert_allclose(position, pose[:3, 3], atol=1e-5)
+        turned = pin.Quaternion(np.array(quaternion)).matrix()
+        np.testing.assert_allclose(turned, pose[:3, :3], atol=1e-4)
+    assert tab.value(f"{ends}.length") == 2
+    seek(tab, 0.5 * motion.duration)
+    shown = tab.screenshot()
+    press(tab, "ends", on=False)
+    seek(tab, 0.5 * motion.duration)
+    changed = np.abs(tab.screenshot() - shown).max(axis=2) > 30
+    press(tab, "ends")
+    assert 1e-4 < changed.mean() < 0.05
 
 
 @needs_chromium

@@ -21,6 +21,7 @@ from hovi.errors import DisplayError
 from hovi.planning.problem.limits import as_limits
 from hovi.robot.loading import load_robot
 from hovi.robot.robot import Robot
+from hovi.robot.urdf import planar_chain
 from hovi.scene.scene import Scene
 from hovi.viewing import plotting
 from hovi.viewing.curves.scheme_torque import scheme_torque
@@ -105,6 +106,25 @@ def test_the_legend_names_the_joints(motion: Trajectory) -> None:
     for figure in (plotting.motion_figure(motion), plotting.angles_figure(motion)):
         texts = [text.get_text() for text in figure.legends[0].get_texts()]
         assert texts == ["shoulder", "elbow"]
+
+
+def test_curves_of_eighteen_joints_differ_and_the_legend_has_the_name_of_each(
+    tmp_path: Path,
+) -> None:
+    (tmp_path / "arm.urdf").write_text(planar_chain.chain(18))
+    arm = load_robot(tmp_path / "arm.urdf")
+    figure = plotting.motion_figure(cubic_motion(Scene(arm, [Gravity(9.8)]))[0])
+    curves = [line for line in figure.axes[0].lines if line.get_label() in arm.joint_names]
+    looks = {line.get_label(): look(line) for line in curves}
+    assert len(set(looks.values())) == len(looks) == 18
+    (legend,) = figure.legends
+    shown = zip(legend.get_lines(), legend.get_texts(), strict=True)
+    assert {text.get_text(): look(line) for line, text in shown} == looks
+
+
+def look(line: Line2D) -> tuple[object, object]:
+    """Its color and its dashes, of which Matplotlib gives only a name."""
+    return line.get_color(), str(line._unscaled_dash_pattern)  # type: ignore[attr-defined]
 
 
 def test_nearby_limits_are_drawn_as_bands(motion: Trajectory) -> None:

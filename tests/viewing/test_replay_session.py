@@ -1,11 +1,9 @@
 from __future__ import annotations
 
-import base64
 import contextlib
 import dataclasses
 import http.client
 import itertools
-import json
 import math
 import re
 import socket
@@ -33,6 +31,7 @@ from hovi.viewing.highlights import _without_short_gaps
 from hovi.viewing.replay_session import Replay, replay
 from hovi.viewing.skeleton import skeleton
 from oracles.headless_browser import CHROMIUM, Tab, headless_browser
+from oracles.offline_pages import messages_of
 from samples.cubic_motion import cubic_motion
 
 Array = npt.NDArray[np.float64]
@@ -74,9 +73,13 @@ def quiet(text: str) -> None:
 
 def messages(page: Path) -> list[dict[str, Any]]:
     """The messages stored in a written page."""
-    found = re.search(r"for \(const message of (\[.*\])\)", page.read_text())
-    assert found is not None
-    return [umsgpack.unpackb(base64.b64decode(m)) for m in json.loads(found[1])]
+    return messages_of(page.read_text())
+
+
+def opened(tab: Tab, page: Path) -> None:
+    """Open a written page and wait for its scene."""
+    tab.open(page.as_uri())
+    tab.until("typeof viewer == 'object' && viewer.animator.actions.length > 0")
 
 
 def seek(tab: Tab, t: float) -> Array:
@@ -429,7 +432,7 @@ def test_a_notebook_shows_the_page(motion: Trajectory, tmp_path: Path) -> None:
 def test_a_page_plays_offline(motion: Trajectory, tmp_path: Path, tab: Tab) -> None:
     replay(motion, html=tmp_path / "motion.html", trace=False)
     tab.requests.clear()
-    tab.open((tmp_path / "motion.html").as_uri())
+    opened(tab, tmp_path / "motion.html")
     first, last = seek(tab, 0.0), seek(tab, motion.duration)
     for picture in (first, last):
         assert 0.002 < colored(picture).mean() < 0.3
@@ -445,7 +448,7 @@ def test_a_link_at_its_limit_is_yellow_on_the_page(
     shown = replay(limited_motion, html=tmp_path / "motion.html", trace=False)
     assert shown.highlights is not None
     during = float(shown.highlights.times[shown.highlights.flags.any(axis=1)].mean())
-    tab.open((tmp_path / "motion.html").as_uri())
+    opened(tab, tmp_path / "motion.html")
     shares = [yellow(seek(tab, t)).mean() for t in (0.0, during, limited_motion.duration)]
     assert shares[1] > 1e-3
     assert max(shares[0], shares[2]) < 1e-4
@@ -457,7 +460,7 @@ def test_a_page_autoplays_and_stops_at_the_goal(
     motion: Trajectory, tmp_path: Path, tab: Tab
 ) -> None:
     replay(motion, html=tmp_path / "motion.html", speed=4.0)
-    tab.open((tmp_path / "motion.html").as_uri())
+    opened(tab, tmp_path / "motion.html")
     tab.until("!viewer.animator.playing")
     node = "viewer.scene_tree.find(['meshcat', 'robot', 'visuals', 'tip_0']).object.position"
     tip = motion.robot.frame_position("tip", motion.q[-1:])[0]  # type: ignore[union-attr]
@@ -467,7 +470,7 @@ def test_a_page_autoplays_and_stops_at_the_goal(
 @needs_chromium
 def test_a_skeleton_is_visible(bare_motion: Trajectory, tmp_path: Path, tab: Tab) -> None:
     replay(bare_motion, html=tmp_path / "motion.html", trace=False)
-    tab.open((tmp_path / "motion.html").as_uri())
+    opened(tab, tmp_path / "motion.html")
     assert colored(seek(tab, 1.0)).mean() > 0.002
     assert not tab.errors
 
@@ -477,7 +480,7 @@ def test_meshes_with_several_materials_are_drawn(tmp_path: Path, tab: Tab) -> No
     """The UR5's shoulder has two parts, one with two materials, which plain meshcat hides."""
     robot = load_robot("ur5")
     replay(cubic_motion(Scene(robot))[0], html=tmp_path / "ur5.html")
-    tab.open((tmp_path / "ur5.html").as_uri())
+    opened(tab, tmp_path / "ur5.html")
     meshes = tab.value(
         "Object.values(viewer.scene_tree.find(['meshcat', 'robot', 'visuals']).children)"
         ".map(n => n.children['<object>'].object).map(o => [o.geometry.attributes.position.count,"
@@ -520,7 +523,7 @@ def test_robots_of_any_size_fill_the_picture(
     (tmp_path / "arm.urdf").write_text(text)
     trajectory, _ = cubic_motion(Scene(load_robot(tmp_path / "arm.urdf")), seed=4)
     replay(trajectory, html=tmp_path / "arm.html", trace=False)
-    tab.open((tmp_path / "arm.html").as_uri())
+    opened(tab, tmp_path / "arm.html")
     rows, columns = np.nonzero(colored(seek(tab, 0.0)))
     assert np.ptp(rows) > 60 or np.ptp(columns) > 60
     assert 0.002 < len(rows) / (800 * 457) < 0.3

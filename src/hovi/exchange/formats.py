@@ -8,6 +8,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy.typing as npt
+
 from hovi.checks.arguments import check_arguments_except
 from hovi.discrete.joined_motion import AnyMotion, joined
 from hovi.discrete.output.caution import warn_of_cautions
@@ -69,6 +71,8 @@ class ExportFormat:
 
 
 _EXCHANGE = "hovi.exchange"
+_OF_FILMS = ("size", "camera", "speed")
+"""What says how a film is made."""
 FORMATS = (
     ExportFormat("csv", (".csv",), 1000.0, "hovi.viewing.csv_table:write_csv", of_samples=True),
     ExportFormat(
@@ -109,8 +113,8 @@ FORMATS = (
     ExportFormat("mcap", (".mcap",), 100.0, f"{_EXCHANGE}.mcap_bag:write_mcap"),
     ExportFormat("mujoco", (".xml",), 50.0, f"{_EXCHANGE}.mujoco_keyframes:write_mujoco"),
     ExportFormat("rerun", (".rrd",), 100.0, f"{_EXCHANGE}.rerun_recording:write_rerun"),
-    ExportFormat("video", (".mp4",), 30.0, f"{_EXCHANGE}.film.film:write_video"),
-    ExportFormat("gif", (".gif",), 15.0, f"{_EXCHANGE}.film.film:write_gif"),
+    ExportFormat("video", (".mp4",), 30.0, f"{_EXCHANGE}.film.film:write_video", options=_OF_FILMS),
+    ExportFormat("gif", (".gif",), 15.0, f"{_EXCHANGE}.film.film:write_gif", options=_OF_FILMS),
     ExportFormat(
         *("parquet", (".parquet",), 1000.0, f"{_EXCHANGE}.parquet_table:write_parquet"),
         of_samples=True,
@@ -140,7 +144,7 @@ def format_of_file(path: Path) -> ExportFormat:
     return by_suffix[suffix]
 
 
-@check_arguments_except("trajectory")
+@check_arguments_except("trajectory", "size", "camera", "speed")
 def export(
     trajectory: Trajectory | Solution | Sequence[Trajectory | Solution],
     path: str | os.PathLike[str],
@@ -151,6 +155,9 @@ def export(
     gap: float = 0.0,
     lookahead_time: float | None = None,
     gain: float | None = None,
+    size: str | tuple[int, int] | None = None,
+    camera: str | npt.ArrayLike | None = None,
+    speed: float | None = None,
 ) -> None:
     """Write a motion in the file format of another program, completely or not at all.
 
@@ -163,6 +170,9 @@ def export(
     gap: time for which the robot rests between two motions, in [s].
     lookahead_time, gain: of servoj in a urscript, 0.03 to 0.2 in [s] and 100 to 2000; 0.1 and 300
         when None.
+    size, camera, speed: of a film: width and height up to 1920x1080; a view (front, side, top, iso)
+        or the position of the camera in [m], perhaps with the point that it looks at; seconds of
+        the motion per second.
     Raises InputError for an unknown format or extension, an invalid rate, a motion that the format
     cannot hold, and motions that do not follow each other; DisplayError when the file cannot be
     written or an optional library is missing.
@@ -172,13 +182,21 @@ def export(
     if gap != 0 and len(motions) < 2:
         raise InputError("a gap is between motions, and there is one: leave it out.")
     chosen = _format(Path(path), format)
-    asked = {"lookahead_time": lookahead_time, "gain": gain, "efforts": efforts or None}
+    asked: dict[str, Any] = {
+        "lookahead_time": lookahead_time,
+        "gain": gain,
+        "efforts": efforts or None,
+    }
+    asked |= {"size": size, "camera": camera, "speed": speed}
     options = {key: value for key, value in asked.items() if value is not None}
     for key in options:
         if key not in chosen.options:
-            only = next(each.name for each in FORMATS if key in each.options)
+            names = [each.name for each in FORMATS if key in each.options]
+            of = f"the format {names[0]!r}"
+            if len(names) > 1:
+                of = f"the formats {' and '.join(names)}, not {chosen.name!r}"
             more = "; the others have them" if key == "efforts" else ""
-            raise InputError(f"`{key}` is for the format {only!r}{more}: leave it out.")
+            raise InputError(f"`{key}` is for {of}{more}: leave it out.")
     chosen.write(joined(motions, gap), Path(path), rate, **options)
 
 

@@ -16,11 +16,13 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from hovi.discrete.trajectory import Trajectory
+from hovi.errors import ModelError
 from hovi.robot.robot import Robot
 from hovi.system.dataclass import dataclass
 from hovi.viewing.animation import placements_at
 from hovi.viewing.highlights import Highlights
 from hovi.viewing.meshcat_page import Page
+from hovi.viewing.meshes.page_mesh import page_mesh
 from hovi.viewing.panel.panel import View
 from hovi.viewing.payloads import Payloads
 from hovi.viewing.recorded_limits import MovingObjects, with_obstacles
@@ -112,8 +114,22 @@ class _RobotVisualizer(MeshcatVisualizer):  # type: ignore[misc]
         self._stored = robot.source.meshes
 
     def loadMeshFromFile(self, geometry_object: pin.GeometryObject) -> Any:
-        """The mesh of a shape, as meshcat has it. The name is Pinocchio's."""
+        """The mesh of a shape, of few triangles. The name is Pinocchio's."""
+        path = Path(geometry_object.meshPath)
         name = self._stored.name_at(geometry_object.meshPath)
+        scale, plain = geometry_object.meshScale, bool(geometry_object.overrideMaterial)
+        try:
+            content = path.read_bytes() if name is None else self._content(name)
+            mesh = page_mesh(path, content, scale, plain)
+        except (OSError, ModelError):
+            mesh = None
+        return self._original(geometry_object, name) if mesh is None else mesh
+
+    def _content(self, name: str) -> bytes:
+        return self._stored.content(self._stored.meshes[name].sha256)
+
+    def _original(self, geometry_object: pin.GeometryObject, name: str | None) -> Any:
+        """The mesh as its file has it, for pictures on its surface."""
         if name is None:
             return super().loadMeshFromFile(geometry_object)
         mesh = self._stored.meshes[name]
@@ -168,7 +184,6 @@ def _ghost(
     for item in visual.geometryObjects:
         item.meshColor = np.array([*_rgb(ghost_color(k)), _GHOST_OPACITY])
         item.overrideMaterial = True
-        item.meshPath = ""  # the triangles alone, so that the color applies
     visualizer = _visualizer(robot, visual, viewer, f"ghost {k}")
     visualizer.display(trajectory.q[0])
     return visualizer

@@ -76,7 +76,6 @@ class Highlights:
                 yellow = item.copy()
                 yellow.name = item.name + _COPY_SUFFIX
                 yellow.meshColor, yellow.overrideMaterial = _HIGHLIGHT_COLOR, True
-                yellow.meshPath = ""  # the triangles alone are smaller than the mesh file
                 both.addGeometryObject(yellow)
         return both
 

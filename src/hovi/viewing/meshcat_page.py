@@ -13,7 +13,7 @@ import html
 import importlib.util
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from functools import cache
 from pathlib import Path
 from string import Template
@@ -38,11 +38,29 @@ _POLICY = """
 form-action 'none'; script-src 'unsafe-inline' 'unsafe-eval' blob:{script}; worker-src blob:; \
 style-src 'unsafe-inline'; img-src data: blob:; connect-src data: blob:{socket}">"""
 
-_PLAY = """for (const message of {messages}) {{
-    viewer.handle_command_bytearray(Uint8Array.from(atob(message), c => c.charCodeAt(0)));
+_OFFLINE = """<script>
+async function unpacked(text) {{
+    const packed = Uint8Array.from(atob(text), c => c.charCodeAt(0));
+    const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
+    return new Uint8Array(await new Response(stream).arrayBuffer());
 }}
-viewer.animator.mixer.timeScale = {speed};"""
-
+(async () => {{
+    const [script, content] = await Promise.all([unpacked("{script}"), unpacked("{content}")]);
+    const element = document.createElement("script");
+    element.textContent = new TextDecoder().decode(script);
+    document.body.append(element);
+    const ends = {sizes}.map((sum => size => sum += size)(0));
+    const parts = ends.map((end, i) => content.subarray(i > 0 ? ends[i - 1] : 0, end));
+    for (const numbers of {messages}) {{
+        viewer.handle_command_bytearray(
+            new Uint8Array(await new Blob(numbers.map(i => parts[i])).arrayBuffer()));
+    }}
+    viewer.animator.mixer.timeScale = {speed};
+}})();
+</script>"""
+"""Unpacks meshcat and the page's own script, then the messages, each of which consists of parts."""
+_LARGE_ARRAY = 1_000
+"""Size from which an array is a part of its own, in [bytes]: equal parts are packed once."""
 
 _UNPACK = """<!DOCTYPE html><meta charset="utf-8"><script>
 const packed = Uint8Array.from(atob("{packed}"), c => c.charCodeAt(0));
@@ -55,10 +73,7 @@ new Response(stream).text().then(text => {{
 
 def packed(page: str) -> str:
     """A page that unpacks another one, which is compressed: robots are mostly their meshes."""
-    # No time in it: the same page gives the same bytes.
-    return _UNPACK.format(
-        packed=base64.b64encode(gzip.compress(page.encode(), 9, mtime=0)).decode()
-    )
+    return _UNPACK.format(packed=_compressed(page.encode()))
 
 
 class Command(Protocol):
@@ -149,10 +164,19 @@ class Page:
         speed: time scale of the animation.
         """
         script = (VIEWER_FOLDER / "main.min.js").read_text(encoding="utf-8")
-        messages = json.dumps([base64.b64encode(m.packed).decode() for m in self.messages.all()])
-        start = _PLAY.format(messages=messages, speed=float(speed))
-        policy = _POLICY.format(script="", socket="")
-        return self._fill(policy, f"<script>{script}</script>", start)
+        parts: dict[bytes, int] = {}
+        messages = [
+            [parts.setdefault(part, len(parts)) for part in _parts_of(message.packed)]
+            for message in self.messages.all()
+        ]
+        start = _OFFLINE.format(
+            script=_compressed(f"{script}\n{_own_script()}".encode()),
+            content=_compressed(b"".join(parts)),
+            sizes=json.dumps([len(part) for part in parts], separators=(",", ":")),
+            messages=json.dumps(messages, separators=(",", ":")),
+            speed=float(speed),
+        )
+        return self._fill(_POLICY.format(script="", socket=""), start)
 
     def live_html(self, host: str) -> str:
         """The page that receives its messages from the server.
@@ -160,18 +184,20 @@ class Page:
         host: name and port of the server, as the browser has them.
         """
         policy = _POLICY.format(script=" 'self'", socket=html.escape(f" ws://{host}"))
-        return self._fill(policy, '<script src="main.min.js"></script>', "viewer.connect();")
+        start = (
+            '<script src="main.min.js"></script>\n'
+            f"<script>\n{_own_script()}\nviewer.connect();\n</script>"
+        )
+        return self._fill(policy, start)
 
-    def _fill(self, policy: str, meshcat: str, start: str) -> str:
+    def _fill(self, policy: str, start: str) -> str:
         parts = {
             "policy": policy,
             "title": html.escape(self.title),
             "note": html.escape(self.note),
             "cautions": html.escape("\n".join(self.cautions)),
             "style": _part("page.css"),
-            "meshcat": meshcat,
             "panel": self.panel.to_json(),
-            "script": _part("stage.js") + _part("controls.js"),
             "start": start,
         }
         return Template(_part("page.html")).substitute(parts)
@@ -180,6 +206,35 @@ class Page:
         """Replace meshcat's identifiers, which contain time and MAC address, by a counter."""
         number = len(self._uuids)
         return self._uuids.setdefault(match[0], b"%08x-0000-4000-8000-000000000000" % number)
+
+
+def _parts_of(message: bytes) -> list[bytes]:
+    """A message divided where large arrays begin and end."""
+    found, at = [], 0
+    for array in _arrays(umsgpack.unpackb(message)):
+        if len(array) >= _LARGE_ARRAY:
+            begin = message.index(array, at)
+            found += [message[at:begin], array]
+            at = begin + len(array)
+    return [*found, message[at:]]
+
+
+def _arrays(value: Any) -> Iterator[bytes]:
+    """The arrays in a message, in the order in which they are packed."""
+    if isinstance(value, umsgpack.Ext):
+        yield value.data
+    elif isinstance(value, dict | list):
+        for each in value.values() if isinstance(value, dict) else value:
+            yield from _arrays(each)
+
+
+def _compressed(content: bytes) -> str:
+    # No time in it: the same page gives the same bytes.
+    return base64.b64encode(gzip.compress(content, 9, mtime=0)).decode()
+
+
+def _own_script() -> str:
+    return _part("stage.js") + _part("controls.js")
 
 
 @cache

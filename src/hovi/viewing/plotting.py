@@ -32,7 +32,7 @@ from hovi.robot.model import frame_named
 from hovi.robot.robot import Robot
 from hovi.robot.space.unwrapped_angles import shown_names
 from hovi.system.dataclass import dataclass
-from hovi.viewing.curves.colors import COLORS
+from hovi.viewing.curves.colors import COLORS, curve_style
 from hovi.viewing.curves.given_motion import motion_in, motions_in
 from hovi.viewing.curves.joint_panels import joint_figure
 from hovi.viewing.curves.scheme_torque import scheme_torque
@@ -46,7 +46,6 @@ from hovi.viewing.segment_marks import draw_segments
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
 
-_LINE_STYLES = ("-", "--", ":", "-.")
 _CURVE_POINTS = 2_000
 _MAX_MARKED_INTERVALS = 150
 _SURFACE_TIMES = 180
@@ -302,7 +301,6 @@ def _lines(
     members: npt.NDArray[np.intp],
 ) -> None:
     t, y = curve.t, scale * y
-    styles = [(c, style) for style, c in itertools.product(_LINE_STYLES, COLORS)]
     gap = np.full((len(t), 1), np.nan)
     broken = np.hstack([t, gap]).ravel()
     limited: list[Curve] = []
@@ -311,9 +309,10 @@ def _lines(
         _RIGHT if ax.yaxis.get_ticks_position() == "right" else "",
     )
     for i in members:
-        color, style = styles[i % len(styles)]
-        line = np.hstack([y[:, :, i], gap]).ravel()
-        ax.plot(broken, line, style, color=color, linewidth=1.4, label=names[i] + side)
+        style = curve_style(int(i))
+        color, line = style.color, np.hstack([y[:, :, i], gap]).ravel()
+        (drawn,) = ax.plot(broken, line, color=color, linewidth=1.4, label=names[i] + side)
+        drawn.set_linestyle(style.line)
         if len(t) <= _MAX_MARKED_INTERVALS:
             ends = np.s_[:, [0, -1]]
             ax.plot(t[ends].ravel(), y[:, :, i][ends].ravel(), ".", color=color, markersize=3)

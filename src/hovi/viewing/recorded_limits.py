@@ -35,19 +35,39 @@ def recorded_limits(trajectory: Trajectory) -> Limits | None:
     Metadata may come from a file: invalid limits, or limits of another robot, count as none.
     """
     data = trajectory.metadata.get("limits")
-    of_segments = trajectory.metadata.get("segment_limits")
+    parts = segment_limits(trajectory)
     try:
         if isinstance(data, dict):
             limits = Limits.from_dict(data, trajectory.robot)
-        elif isinstance(of_segments, list) and of_segments:
-            limits = _loosest([Limits.from_dict(each, trajectory.robot) for each in of_segments])
+        elif parts:
+            limits = _loosest(list(parts))
         else:
             return None
     except (InputError, KeyError, TypeError, ValueError):
         return None
+    bounded = limits.bounded.any() or limits.conditions
+    return limits if bounded and _fit(limits, trajectory) else None
+
+
+def _fit(limits: Limits, trajectory: Trajectory) -> bool:
+    """Whether they are of as many coordinates, and none of a derivative that the motion lacks."""
     fits = limits.lower.shape[1] == trajectory.v.shape[1]
-    fits = fits and not (limits.on_rates and trajectory.grid.order < 3)
-    return limits if fits and (limits.bounded.any() or limits.conditions) else None
+    return fits and not (limits.on_rates and trajectory.grid.order < 3)
+
+
+def segment_limits(trajectory: Trajectory) -> tuple[Limits, ...]:
+    """The recorded limits of each segment; () where all have the same ones.
+
+    Metadata may come from a file: invalid limits, or limits of another robot, count as none.
+    """
+    data = trajectory.metadata.get("segment_limits")
+    if not isinstance(data, list):
+        return ()
+    try:
+        parts = tuple(Limits.from_dict(each, trajectory.robot) for each in data)
+    except (InputError, AttributeError, KeyError, TypeError, ValueError):
+        return ()
+    return parts if all(_fit(each, trajectory) for each in parts) else ()
 
 
 def _loosest(parts: list[Limits]) -> Limits:

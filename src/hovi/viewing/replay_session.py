@@ -28,6 +28,7 @@ from hovi.viewing.drawing import drawn, ghost_color
 from hovi.viewing.highlights import AT_LIMIT_NOTE, Highlights
 from hovi.viewing.meshcat_page import Page, packed
 from hovi.viewing.meshcat_server import ServedPage
+from hovi.viewing.meshes.page_mesh import MESH_NOTE
 from hovi.viewing.panel.panel import Curves, Panel, View, joints_of, labels_of, names_of
 from hovi.viewing.recorded_limits import MovingObjects, imposed_limits, led_back_sentence
 
@@ -325,7 +326,9 @@ def _open_browser(page: ServedPage) -> None:
 
 def _note(led_back: str, robot: Robot, highlights: Highlights | None) -> str:
     at_limit = "" if highlights is None else AT_LIMIT_NOTE
-    notes = [led_back, robot.visual_problem, at_limit]
+    visual = robot.visual
+    meshes = visual is not None and any(each.meshPath for each in visual.geometryObjects)
+    notes = [led_back, robot.visual_problem, at_limit, MESH_NOTE if meshes else ""]
     return " ".join(note for note in notes if note)
 
 

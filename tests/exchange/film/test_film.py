@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import os
 import warnings
 from pathlib import Path
@@ -16,7 +17,7 @@ import hovi
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import DisplayError, HoviWarning, InputError
 from hovi.exchange.film import headless_browser
-from hovi.exchange.film.pictures import SIZE
+from hovi.exchange.film.shot import SIZE, Shot
 from oracles.processes import (
     arguments,
     descendants,
@@ -68,6 +69,46 @@ def test_a_gif_shows_the_replay_page_without_its_controls(
     assert changed(found[2], found[-1]) > 0.002
     dark = found[0][:, SIZE[0] * 2 // 3 :, :].max(axis=2) < 60  # the page's panel is dark
     assert dark.mean() < 0.05
+
+
+@pytest.mark.parametrize("page", [pytest.param(True, marks=with_browser), False])
+def test_a_film_has_the_size_the_speed_and_the_camera_that_are_given(
+    motion: Trajectory, tmp_path: Path, page: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if not page:
+        monkeypatch.setattr(headless_browser, "NAMES", ())
+    films = []
+    for k, camera in enumerate(("side", "0.0,-8,0:0,0,1")):
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", HoviWarning)
+            motion.to_gif(tmp_path / f"{k}.gif", 4.0, size="320x240", speed=2.0, camera=camera)
+        found, _ = pictures_of(tmp_path / f"{k}.gif")
+        assert len(found) == 3  # 0, 0.5 and 0.8 s of the motion
+        assert found[0].shape == (240, 320, 3)
+        films.append(found[0])
+    for one, other in itertools.pairwise(films):
+        assert changed(one, other) > 0.002
+
+
+def test_a_size_a_camera_and_a_speed_are_checked(motion: Trajectory, tmp_path: Path) -> None:
+    for given in ("640", "640x", (640, 481), "62x62", "1922x1080", [640, 480, 3], 640, "640.5x2"):
+        with pytest.raises(InputError, match="size of a film must be"):
+            Shot.of(size=given)
+    for given in ("1,2", "1,2,3:4,5", "1,2,nan", [1, 2], [[1, 2, 3]] * 3, "1,2,3:4,5,6:7,8,9", 7):
+        with pytest.raises(InputError, match="camera of a film is a view"):
+            Shot.of(camera=given)
+    with pytest.raises(InputError, match="there is no view 'tpo': did you mean 'top'"):
+        Shot.of(camera="tpo")
+    with pytest.raises(InputError, match="looks at where it is"):
+        Shot.of(camera="1,2,3:1,2,3")
+    for speed in (0.0, -1.0, np.inf):
+        with pytest.raises(InputError, match="speed of a film must be a positive number"):
+            Shot.of(speed=speed)
+    with pytest.raises(InputError, match="`speed` is for the formats video and gif, not 'csv'"):
+        hovi.export(motion, tmp_path / "m.csv", speed=2.0)
+    with pytest.raises(InputError, match="choose a lower rate"):
+        motion.to_gif(tmp_path / "motion.gif", 50.0, speed=1e-4)
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize("page", [pytest.param(True, marks=with_browser), False])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import http.client
 import re
 import threading
@@ -10,12 +11,17 @@ from collections.abc import Iterator
 from pathlib import Path
 from urllib.parse import urlsplit
 
+import numpy as np
 import pytest
+from PIL import Image
 
+from hovi.discrete.state import State
+from hovi.discrete.trajectory import Trajectory
+from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.task_file.reading import load_task
 from hovi.planning.task_file.task_plan import plan_task
 from hovi.robot.bundled_models import example
-from hovi.viewing.documents.demo import MOTIONS, DemoServer, menu_html
+from hovi.viewing.documents.demo import FIRST, MOTIONS, DemoServer, menu_html
 from oracles.headless_browser import CHROMIUM, Tab, headless_browser
 
 needs_chromium = pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed")
@@ -54,6 +60,35 @@ def test_the_menu_has_every_scene_file_to_copy() -> None:
     assert not re.search(r"(src|href)=\"(?!data:)", menu)
 
 
+def test_every_motion_has_a_picture() -> None:
+    menu = menu_html()
+    for each in MOTIONS:
+        with Image.open(each.picture) as picture:
+            assert picture.size == (320, 180)
+        assert base64.b64encode(each.picture.read_bytes()).decode() in menu
+
+
+def test_the_first_motion_is_that_of_its_scene_and_is_not_planned() -> None:
+    first, task = Trajectory.load(FIRST), load_task(example(f"{MOTIONS[0].scene}.toml"))
+    assert first.metadata["status"] == "minimum"
+    assert isinstance(task.start, State)
+    np.testing.assert_allclose(first.q[0], task.start.q, atol=1e-12)
+    assert isinstance(task.goal, FrameGoal)
+    assert first.robot is not None
+    pose = first.robot.frame_pose(task.goal.frame, first.q[-1])
+    np.testing.assert_allclose(pose[:3, 3], task.goal.position, atol=1e-6)
+    assert first.duration == task.duration
+    told: list[str] = []
+    server = DemoServer()
+    planner = threading.Thread(target=server.plan_what_is_chosen, args=(told.append,))
+    planner.start()
+    with urllib.request.urlopen(f"{server.url}motion/{MOTIONS[0].scene}", timeout=60) as answer:
+        assert "const PANEL" in answer.read().decode()
+    server.close()
+    planner.join()
+    assert told == []
+
+
 def test_a_motion_is_planned_when_it_is_asked_for(demo: DemoServer) -> None:
     with urllib.request.urlopen(f"{demo.url}motion/{QUICK}", timeout=120) as answer:
         page = answer.read().decode()
@@ -72,6 +107,26 @@ def test_other_names_and_other_hosts_are_refused(demo: DemoServer) -> None:
         connection.request("GET", path, headers={"Host": host})
         assert connection.getresponse().status == status
         connection.close()
+
+
+@needs_chromium
+def test_the_first_motion_plays_at_once_next_to_the_menu_and_a_phone_shows_the_menu(
+    demo: DemoServer,
+) -> None:
+    frame = "document.querySelector('iframe')"
+    with headless_browser((1280, 800)) as tab:
+        tab.call("Page.navigate", url=demo.url)
+        tab.until(f"{frame}?.contentWindow?.viewer?.animator?.actions?.length > 0")
+        assert tab.value(f"{frame}.src").endswith(MOTIONS[0].scene)
+        assert tab.value("document.querySelector('.chosen').id") == MOTIONS[0].scene
+        metrics = {"width": 390, "height": 844, "deviceScaleFactor": 1}
+        tab.call("Emulation.setDeviceMetricsOverride", mobile=True, **metrics)
+        tab.call("Page.navigate", url=demo.url)
+        tab.until("document.querySelectorAll('.card img').length == 8")
+        assert tab.value(f"{frame} === null")
+        loaded = "[...document.querySelectorAll('.card img')].every(each => each.naturalWidth > 0)"
+        tab.until(loaded)
+        assert not tab.errors
 
 
 @needs_chromium

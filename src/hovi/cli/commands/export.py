@@ -45,6 +45,17 @@ def export(
     gain: Annotated[
         float | None, typer.Option(help="Of servoj in a urscript, 100 to 2000; default 300.")
     ] = None,
+    size: Annotated[
+        str | None, typer.Option(metavar="WIDTHxHEIGHT", help="Pixels of a film, up to 1920x1080.")
+    ] = None,
+    camera: Annotated[
+        str | None,
+        typer.Option(
+            metavar="VIEW|X,Y,Z[:X,Y,Z]",
+            help="Of a film: front, side, top, iso, or its position and what it looks at, in m.",
+        ),
+    ] = None,
+    speed: Annotated[float | None, typer.Option(help="Of a film; 1 is real time.")] = None,
     package_dir: PackageDirs = None,
 ) -> None:
     """Export a motion for other programs, or several as one.
@@ -62,6 +73,7 @@ def export(
         _require_other_file(target, each)
     motions = [load_shown(each, package_dir) for each in files]
     options: dict[str, Any] = {"lookahead_time": lookahead_time, "gain": gain}
+    options |= {"size": size, "camera": camera, "speed": speed}
     write(motions, target, chosen.name, rate, gap=gap, **options)
     print(f"wrote {target}")
 

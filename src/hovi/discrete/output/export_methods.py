@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from typing import Any
 
 from hovi.checks.arguments import check_arguments
 from hovi.discrete.output.exporter import exported
@@ -75,10 +76,26 @@ class ExportMethods:
         """Write a recording of the Rerun viewer: curves of the joints and the moving robot."""
         exported(self, path, "rerun", rate)
 
-    def to_video(self, path: Path, rate: float | None = None) -> None:
-        """Write an MP4 video of the replay."""
-        exported(self, path, "video", rate)
+    def to_video(
+        self,
+        path: Path,
+        rate: float | None = None,
+        *,
+        size: Any = None,
+        camera: Any = None,
+        speed: float | None = None,
+    ) -> None:
+        """Write an MP4 video of the replay. size, camera, speed: as for `hovi.export`."""
+        exported(self, path, "video", rate, size=size, camera=camera, speed=speed)
 
-    def to_gif(self, path: Path, rate: float | None = None) -> None:
-        """Write a GIF of the replay."""
-        exported(self, path, "gif", rate)
+    def to_gif(
+        self,
+        path: Path,
+        rate: float | None = None,
+        *,
+        size: Any = None,
+        camera: Any = None,
+        speed: float | None = None,
+    ) -> None:
+        """Write a GIF of the replay. size, camera, speed: as for `hovi.export`."""
+        exported(self, path, "gif", rate, size=size, camera=camera, speed=speed)

@@ -39,9 +39,13 @@ def read_obstacles(
     return clearance.obstacles
 
 
-def obstacle_table(obstacle: Obstacle, folder: Path) -> dict[str, Any]:
-    """The table of an obstacle in a file of a folder; paths are relative to the folder."""
+def obstacle_table(obstacle: Obstacle, folder: Path | None) -> dict[str, Any]:
+    """The table of an obstacle in a file of a folder; paths are relative to the folder.
+
+    folder: None for the name of a file alone.
+    """
     table = obstacle.to_dict()
     if "file" in table:
-        table["file"] = os.path.relpath(table["file"], folder.resolve())
+        file = Path(table["file"])
+        table["file"] = file.name if folder is None else os.path.relpath(file, folder.resolve())
     return table

@@ -29,7 +29,7 @@ from hovi.system.files import make_folders, reason, whole_file
 
 _TABLES = ("limits", "start", "goal", "segments", "via", "keep", "obstacles", "grasped", "scheme")
 """Keys that may hold tables, in the order in which the tables are written."""
-_EMPTY: tuple[Any, ...] = (None, [])
+_EMPTY: tuple[Any, ...] = (None, [], {})
 
 
 @check_arguments
@@ -42,7 +42,7 @@ def save_task(task: Task, path: str | Path) -> Path:
     option that scene files have no key for.
     """
     path = Path(path)
-    content = tomlkit.dumps(_document(task, path.parent)).encode("utf-8")
+    content = task_text(task, path.parent).encode("utf-8")
     try:
         make_folders(path.parent)
         _keep_robot_beside(task.scene.robot.source, path)
@@ -52,7 +52,16 @@ def save_task(task: Task, path: str | Path) -> Path:
     return path
 
 
-def _document(task: Task, folder: Path) -> tomlkit.TOMLDocument:
+def task_text(task: Task, folder: Path | None = None) -> str:
+    """A task as TOML. Raises SceneError for an option that scene files have no key for.
+
+    folder: that of the file, to which paths are relative; None for the names of files alone, as for
+        readers on another machine.
+    """
+    return tomlkit.dumps(_document(task, folder))
+
+
+def _document(task: Task, folder: Path | None) -> tomlkit.TOMLDocument:
     """The task as TOML, in which tables come after plain keys."""
     robot = task.scene.robot
     keys = {
@@ -78,7 +87,7 @@ def _document(task: Task, folder: Path) -> tomlkit.TOMLDocument:
     return document
 
 
-def _robot_keys(task: Task, folder: Path) -> dict[str, Any]:
+def _robot_keys(task: Task, folder: Path | None) -> dict[str, Any]:
     """The robot, how it is loaded, and which of its joints are passive."""
     source = task.scene.robot.source
     return {
@@ -108,7 +117,7 @@ def _locked(source: RobotSource) -> Any:
     return table
 
 
-def _option_keys(task: Task, folder: Path) -> dict[str, Any]:
+def _option_keys(task: Task, folder: Path | None) -> dict[str, Any]:
     """The options by key: single values by their own rule, and those with a special form."""
     options, robot = task.options, task.scene.robot
     plain = {name: _plain(name, options) for name in PLAIN}
@@ -210,8 +219,10 @@ def _item(value: Any) -> Any:
     return table
 
 
-def _relative(source: RobotSource, folder: Path) -> list[str]:
-    """Package folders relative to `folder`."""
+def _relative(source: RobotSource, folder: Path | None) -> list[str]:
+    """Package folders relative to `folder`; none without one."""
+    if folder is None:
+        return []
     return [os.path.relpath(each, folder.resolve()) for each in source.package_dirs]
 
 

@@ -25,21 +25,40 @@ MAX_DEPTH = 200
 """Largest depth of nested elements."""
 MAX_NODES = 100_000
 """Largest number of nodes that are shown, each counted as often as it is."""
-_LIBRARIES = "geometry", "node", "visual_scene", "controller"
+_LIBRARIES = "geometry", "node", "visual_scene", "controller", "material", "effect"
+_GRAY = 0.8, 0.8, 0.8
 _TRANSFORMS = "matrix", "translate", "rotate", "scale", "lookat", "skew"
 
 
 @dataclass(frozen=True, eq=False)
 class _Part:
-    """Vertices (M, 3) and triangles (K, 3) of a geometry."""
+    """Vertices (M, 3) and triangles (K, 3) of a geometry.
+
+    materials: the symbols of its materials, with the number of triangles of each, in order. paint:
+        the color of each triangle, (K, 3); None for a picture.
+    """
 
     vertices: Array
     triangles: Index
+    materials: tuple[tuple[str, int], ...] = ()
+    paint: Array | None = None
 
 
 def read_collada(content: bytes) -> Triangles:
     """The triangles of a Collada file. Raises BrokenMeshError."""
     return _Document(_parsed(content)).triangles()
+
+
+def painted_collada(content: bytes) -> tuple[Triangles, Array | None]:
+    """The triangles, and the color of each, (K, 3), from 0 to 1; None if one has a picture.
+
+    Raises BrokenMeshError.
+    """
+    document = _Document(_parsed(content))
+    triangles = document.triangles()
+    paints = [each.paint for each in document.found]
+    known = [each for each in paints if each is not None]
+    return triangles, np.concatenate(known) if len(known) == len(paints) else None
 
 
 def _parsed(content: bytes) -> Element:
@@ -134,7 +153,7 @@ class _Document:
             elif child.tag == "instance_node":
                 self._place(self._target(child, "node"), placement, above)
             elif child.tag in ("instance_geometry", "instance_controller"):
-                self._add(self._geometry(child), placement)
+                self._add(self._geometry(child), placement, child)
 
     def _geometry(self, instance: Element) -> Element:
         """The geometry of an instance, also one that a skin or a morph deforms."""
@@ -145,7 +164,7 @@ class _Document:
         source = "" if skin is None else skin.get("source", "")
         return self._target(Element("instance", url=source), "geometry")
 
-    def _add(self, geometry: Element, placement: Array) -> None:
+    def _add(self, geometry: Element, placement: Array, instance: Element) -> None:
         name = geometry.get("id", "")
         if name not in self.parts:
             self.parts[name] = [_part(mesh) for mesh in geometry.iterfind("mesh")]
@@ -154,7 +173,38 @@ class _Document:
             require_few(self.count)
             with np.errstate(over="ignore", invalid="ignore"):  # coordinates are checked later
                 vertices = part.vertices @ placement[:, :3].T + placement[:, 3]
-            self.found.append(_Part(vertices, part.triangles))
+            paint = self._paint(part, instance)
+            # a mirror turns the triangles inside out
+            mirrored = np.linalg.det(placement[:, :3]) < 0
+            triangles = part.triangles[:, ::-1] if mirrored else part.triangles
+            self.found.append(_Part(vertices, triangles, part.materials, paint))
+
+    def _paint(self, part: _Part, instance: Element) -> Array | None:
+        """The colors of the triangles of a part, (K, 3), where an instance shows it."""
+        bound = {
+            each.get("symbol", ""): each.get("target", "").removeprefix("#")
+            for each in instance.iterfind("bind_material/technique_common/instance_material")
+        }
+        found = [self._color(bound.get(symbol, symbol)) for symbol, _ in part.materials]
+        colors = [each for each in found if each is not None]
+        if len(colors) < len(found):
+            return None
+        counts = [count for _, count in part.materials]
+        return np.repeat(np.array(colors, dtype=float).reshape(-1, 3), counts, axis=0)
+
+    def _color(self, material: str) -> tuple[float, ...] | None:
+        """The diffuse color of a material; None for a picture, gray for one that is not there."""
+        effect = self.by_id.get(("material", material))
+        given = None if effect is None else effect.find("instance_effect")
+        name = "" if given is None else given.get("url", "").removeprefix("#")
+        shading = self.by_id.get(("effect", name))
+        if shading is None:
+            return _GRAY
+        diffuse = list(shading.iter("diffuse"))
+        if any(each.find("texture") is not None for each in diffuse):
+            return None
+        texts = [text for each in diffuse if (text := each.findtext("color")) is not None]
+        return tuple(np.clip(_numbers(texts[0], 4)[:3], 0.0, 1.0)) if texts else _GRAY
 
 
 def _part(mesh: Element) -> _Part:
@@ -167,6 +217,7 @@ def _part(mesh: Element) -> _Part:
     }
     points: dict[str, Array] = {}
     found, at, vertices = [np.empty((0, 3), np.int64)], 0, [np.empty((0, 3))]
+    materials = []
     for primitive in mesh:
         if primitive.tag not in _PRIMITIVES:
             continue
@@ -178,9 +229,10 @@ def _part(mesh: Element) -> _Part:
             points[name] = _points(source)
         counts, corners = _PRIMITIVES[primitive.tag](primitive, width)
         found.append(at + triangulated(points[name], counts, corners[index::width]))
+        materials.append((primitive.get("material", ""), len(found[-1])))
         vertices.append(points[name])
         at += len(points[name])
-    return _Part(np.concatenate(vertices), np.concatenate(found))
+    return _Part(np.concatenate(vertices), np.concatenate(found), tuple(materials))
 
 
 def _inputs(primitive: Element) -> tuple[str, int, int]:

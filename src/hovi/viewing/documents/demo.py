@@ -1,4 +1,6 @@
-"""A menu of motions in the browser, each planned when it is chosen, with its scene file to copy.
+"""A menu of motions in the browser with their scene files, the first of which plays at once.
+
+The others are planned when they are chosen.
 
 The pages are served to browsers of this machine only, as a replay is, by a thread. Motions are
 planned in the main thread, one at a time, so that Ctrl-C ends them.
@@ -7,6 +9,7 @@ planned in the main thread, one at a time, so that Ctrl-C ends them.
 from __future__ import annotations
 
 import asyncio
+import base64
 import html
 import queue
 import threading
@@ -16,6 +19,7 @@ from string import Template
 
 import tornado.web
 
+from hovi.discrete.trajectory import Trajectory
 from hovi.errors import HoviError
 from hovi.planning.task_file.reading import load_task
 from hovi.planning.task_file.task_plan import plan_task
@@ -36,6 +40,11 @@ class Demonstration:
     def text(self) -> str:
         """The scene file."""
         return example(f"{self.scene}.toml").read_text(encoding="utf-8")
+
+    @property
+    def picture(self) -> Path:
+        """A picture of the motion."""
+        return _PICTURES / f"{self.scene}.jpg"
 
     def page(self) -> str:
         """Plan the motion and write its page. Raises as `plan_task` does."""
@@ -88,11 +97,16 @@ MOTIONS = (
 """The motions of `hovi demo`; each is planned in some seconds."""
 
 _MENU = Path(__file__).with_name("demo.html")
+_PICTURES = Path(__file__).with_name("pictures")
+FIRST = _PICTURES / "first_motion.npz"
+"""The first motion, planned in advance, which is shown at once."""
 _INTRO = (
-    "Eight motions. Each is a scene file, planned when you choose it. "
+    "Eight motions. Each is a scene file; the first was planned in advance, the others when you "
+    "choose them. "
     "Copy the file, change it, and run <code>hovi plan my_scene.toml</code>."
 )
-_CARD = """<section class="card" id="{scene}"><h2>{title}</h2><p>{sentence}</p>
+_CARD = """<section class="card" id="{scene}"><img alt="" src="data:image/jpeg;base64,{picture}">
+<h2>{title}</h2><p>{sentence}</p>
 <button class="play">Play</button>
 <details><summary>{scene}.toml</summary>
 <button class="copy">Copy</button><pre>{text}</pre></details>
@@ -107,6 +121,7 @@ def menu_html() -> str:
             title=html.escape(each.title),
             sentence=html.escape(each.sentence),
             text=html.escape(each.text()),
+            picture=base64.b64encode(each.picture.read_bytes()).decode(),
         )
         for each in MOTIONS
     ]
@@ -138,12 +153,17 @@ class DemoServer:
         tell: called with a line of text for each motion.
         """
         while (chosen := self._chosen.get()) is not None:
-            tell(f"planning {chosen.scene}")
             try:
-                page = chosen.page()
+                page = self._page(chosen, tell)
             except HoviError as error:
                 page = f"<!DOCTYPE html><meta charset='utf-8'><p>{html.escape(str(error))}</p>"
             self._loop.call_soon_threadsafe(self._pages[chosen.scene].set_result, page)
+
+    def _page(self, chosen: Demonstration, tell: Callable[[str], object]) -> str:
+        if chosen is MOTIONS[0]:
+            return page_of(Trajectory.load(FIRST)).offline_html()
+        tell(f"planning {chosen.scene}")
+        return chosen.page()
 
     def page(self, scene: str) -> asyncio.Future[str] | None:
         """The page of a scene, planned once; None for another name. For the server's thread."""
@@ -170,6 +190,7 @@ class DemoServer:
             ]
         )
         self._server.add_socket(listener)  # type: ignore[arg-type]
+        self.page(MOTIONS[0].scene)  # before a browser asks for it
 
     def _run(self) -> None:
         asyncio.set_event_loop(self._loop)

@@ -1,4 +1,4 @@
-"""A report of a motion in one file: replay, curves, certificate, effects, scene and versions."""
+"""A report of a motion in one file: replay, curves, peaks, certificate, effects and scene."""
 
 from __future__ import annotations
 
@@ -28,13 +28,22 @@ from hovi.flows.execution.dynamics_replay import DynamicsReplay, replay_dynamics
 from hovi.planning.clearance.clearance_violation import closest_along
 from hovi.planning.problem.limit_conditions import closeness
 from hovi.planning.problem.limits import KINDS
+from hovi.planning.task_file.motion_task import task_of_motion
+from hovi.planning.task_file.writing import task_text
 from hovi.scene.scene import Scene
 from hovi.system.deadline import Deadline, OutOfTimeError
 from hovi.system.files import reason, whole_file
 from hovi.version import __version__
 from hovi.viewing.curves.given_motion import motion_in
+from hovi.viewing.documents.motion_peaks import NO_LIMIT, QUANTITIES, Peak, motion_peaks
 from hovi.viewing.plotting import motion_figure
-from hovi.viewing.recorded_limits import kept_distances, led_back_sentence, recorded_limits
+from hovi.viewing.recorded_limits import (
+    imposed_clearance,
+    kept_distances,
+    led_back_sentence,
+    recorded_limits,
+    segment_limits,
+)
 from hovi.viewing.replay_session import page_of
 
 if TYPE_CHECKING:
@@ -47,6 +56,9 @@ _FRAME = Path(__file__).with_name("report.html")
 _SAMPLES = 401
 _SECONDS = 30.0
 _HASH_SALT = "hovi"  # so that the same motion gives the same picture
+_SCENE_HEAD = (
+    "# The scene of this motion, for hovi plan; start and goal are the joints at its ends.\n"
+)
 _MAX_SCENE = 60_000  # [characters]
 
 
@@ -54,9 +66,10 @@ _MAX_SCENE = 60_000  # [characters]
 def write_report(trajectory: Trajectory | Solution, path: str | os.PathLike[str]) -> None:
     """Write one HTML file about a motion that needs no network, for somebody without hovi.
 
-    It replays the motion, and shows its curves, what was recorded of its solution, what is checked
-    now (a simulation of its torques, its margins), what each effect of the scene contributes to the
-    torques, the scene, and the versions. The same motion gives the same bytes.
+    It replays the motion, and shows its curves, the peaks of each joint next to their limits, what
+    was recorded of its solution, what is checked now (a simulation of its torques, its margins),
+    what each effect of the scene contributes to the torques, a scene file, and the versions. The
+    same motion gives the same bytes.
 
     path: the file; it is written completely or not at all. Raises DisplayError.
     """
@@ -83,6 +96,7 @@ def report_html(trajectory: Trajectory) -> str:
         cautions=_cautions(trajectory),
         page=html.escape(page.offline_html()),
         curves=_curves(trajectory),
+        peaks=_peaks(trajectory),
         certificate=_table(tuple(_certificate(trajectory))),
         effects=_effects(trajectory),
         scene=html.escape(_scene(trajectory)),
@@ -229,15 +243,64 @@ def _contribution(trajectory: Trajectory, scene: Scene, key: str) -> Row:
     )
 
 
+def _peaks(trajectory: Trajectory) -> str:
+    """A table by quantity, of each segment."""
+    segments = motion_peaks(trajectory)
+    whose = "the motion was planned within" if segments[0].imposed else "of the URDF, not imposed"
+    parts = [
+        f"<p>The largest value of each joint, and when; limits are those {whose}. The margin is "
+        "the least distance from them, in percent of their range; a yellow row is at a limit.</p>"
+    ]
+    for each in segments:
+        if each.name:
+            parts.append(f"<h3>{html.escape(f'{each.name}, {each.begin:.4g} to {each.end:.4g} s')}")
+            parts.append("</h3>")
+        tables = [_peak_table(QUANTITIES[q], peaks) for q, peaks in each.peaks.items()]
+        parts.append(f"<div class='peaks'>{''.join(tables)}</div>")
+    return "".join(parts)
+
+
+def _peak_table(title: str, peaks: tuple[Peak, ...]) -> str:
+    """Joints, peaks and times, and limits where there are any; one unit of all is in the title."""
+    units = {each.unit for each in peaks}
+    title += f" [{units.pop()}]" if len(units) == 1 else ""
+    limited = any(np.isfinite(each.margin) for each in peaks)
+    title += "" if limited else ", without limits"
+    columns = ("joint", "peak", "at [s]", "limit", "margin")[: 5 if limited else 3]
+    rows = []
+    for each in peaks:
+        unit = f" {each.unit}" if units else ""
+        texts = [f"{each.value:.4g}{unit}", f"{each.t:.3f}"]
+        if limited:
+            margin = "" if np.isinf(each.margin) else f"{100 * each.margin + 0.0:.1f} %"
+            texts += [each.limit + unit * (each.limit != NO_LIMIT), margin]
+        cells = "".join(f"<td class='number'>{html.escape(text)}</td>" for text in texts)
+        mark = " class='limit'" if each.at_limit else ""
+        rows.append(f"<tr{mark}><td>{html.escape(each.joint)}</td>{cells}</tr>")
+    head = "".join(f"<th>{each}</th>" for each in columns)
+    return f"<table><caption>{html.escape(title)}</caption><tr>{head}</tr>{''.join(rows)}</table>"
+
+
 def _scene(trajectory: Trajectory) -> str:
-    scene, parts = trajectory.scene, trajectory.segments
-    scenes = [scene] if scene is not None else [] if parts is None else list(parts.scenes)
-    shown = []
-    for each in scenes:
+    """A scene file of the motion; what is recorded of its scenes where there can be none."""
+    try:
+        return _scene_file(trajectory)[:_MAX_SCENE]
+    except HoviError as error:
+        shown = [f"# no scene file: {error}"]
+    for each in trajectory.scenes:
         data = each.to_dict()
         data["robot"] = each.robot.name  # its file has a section of its own in the motion
         shown.append(json.dumps(data, indent=2, default=str))
     return "\n".join(dict.fromkeys(shown))[:_MAX_SCENE]
+
+
+def _scene_file(trajectory: Trajectory) -> str:
+    limits, parts = recorded_limits(trajectory), segment_limits(trajectory)
+    task = task_of_motion(trajectory, limits, parts, imposed_clearance(trajectory))
+    names = trajectory.metadata.get("conditions")
+    left_out = [str(each) for each in names] if isinstance(names, list) else []
+    note = f"# Without its conditions: {', '.join(left_out)}.\n" if left_out else ""
+    return _SCENE_HEAD + note + task_text(task)
 
 
 def _table(rows: tuple[Row, ...], head: bool = False) -> str:

@@ -90,6 +90,7 @@ class Controls {
         this.loop = this.chip("Loop", on => this.repeat(on));
         if (panel.trace) { this.chip("Path", on => this.visible("trace", on), true); }
         if (panel.joints.length > 0) {
+            this.chip("Ends", on => { this.viewer.set_property(["Ends"], "visible", on); this.viewer.set_dirty(); }, true);
             this.chip("Names", on => this.marked("names", on));
             this.chip("Frames", on => this.marked("frames", on));
         }
@@ -205,9 +206,9 @@ class Controls {
         const all = panel.names.every(name => name.endsWith(suffix) && name.length > suffix.length);
         const brief = name => all ? name.slice(0, -suffix.length) : name;
         this.rows = panel.names.map((name, i) => {
-            const dot = element("i");
-            dot.style.background = panel.colors[i];
-            const label = element("span", { class: "joint label", title: name }, dot, brief(name));
+            const sample = drawing("svg", { class: "sample", viewBox: "0 0 20 10" });
+            sample.append(drawing("path", { d: "M0 5 H20", ...this.style(i, 1.4) }));
+            const label = element("span", { class: "joint label", title: name }, sample, element("span", { text: brief(name) }));
             label.onclick = () => this.only(i);
             const rounding = 1e-9 * Math.max(...panel.tau[i].map(Math.abs));
             const scale = panel.angular[i] ? 180 / Math.PI : 1;
@@ -275,7 +276,8 @@ class Controls {
         all.forEach((set, k) => set.forEach((y, i) => {
             const length = k === 0 ? 1 : panel.others[k - 1].duration / panel.duration;
             const points = y.map((value, j) => `${(W * length * j / (y.length - 1)).toFixed(1)} ${Y(value)}`);
-            add(`M${points.join("L")}`, { class: k === 0 ? "curve" : "curve other", stroke: panel.colors[i], "data-joint": i });
+            const style = k === 0 ? this.style(i, 1.6) : { stroke: panel.colors[i] };
+            add(`M${points.join("L")}`, { class: k === 0 ? "curve" : "curve other", ...style, "data-joint": i });
         }));
         svg.append(drawing("rect", { x: 0, y: 0, width: W, height: H }));
         const cursor = element("div", { class: "cursor" });
@@ -293,6 +295,12 @@ class Controls {
         strip.onpointermove = event => { if (event.buttons) { seek(event); } };
         document.getElementById("side").append(element("h2", { text: `${kind[0].toUpperCase()}${kind.slice(1)} [${both}]` }), strip);
         return { cursor, svg };
+    }
+
+    // The color of a joint, and its dashes where there are more joints than colors.
+    style(i, width) {
+        const dashes = this.panel.dashes[i].map(length => length * width);
+        return { stroke: this.panel.colors[i], ...dashes.length > 0 ? { "stroke-dasharray": dashes.join(" ") } : {} };
     }
 
     // Fade the curves of all joints but one; again for all.

@@ -22,7 +22,7 @@ from hovi.robot.model import frame_id
 from hovi.robot.robot import Robot
 from hovi.robot.space.unwrapped_angles import shown_names
 from hovi.system.dataclass import dataclass
-from hovi.viewing.curves.colors import COLORS
+from hovi.viewing.curves.colors import curve_style
 from hovi.viewing.curves.scheme_torque import scheme_torque
 
 Array = npt.NDArray[np.float64]
@@ -111,6 +111,7 @@ class Panel:
         """As text that is safe inside a script element."""
         own = None if self.curves is None else self.curves.to_dict()
         names = () if own is None else self.names
+        styles = [curve_style(i) for i in range(len(names))]
         data = {
             "duration": self.duration,
             "speed": self.speed,
@@ -122,7 +123,8 @@ class Panel:
             "mark": round(0.13 * self.view.size, _DIGITS),
             "names": names,
             "angular": self.angular,
-            "colors": [COLORS[i % len(COLORS)] for i in range(len(names))],
+            "colors": [each.color for each in styles],
+            "dashes": [each.dashes for each in styles],
             **({"q": [], "v": [], "tau": []} if own is None else own),
             "others": [each.to_dict() for each in self.others],
             "limits": {kind: self._bounds(kind, len(names)) for kind in ("q", "v", "tau")},
@@ -163,7 +165,7 @@ def joints_of(
         poses[-1] += [_pose(data.oMf[tip]) for tip in tips]
     tracks = np.swapaxes(np.array(poses), 0, 1)  # (joints + tips, M, 7)
     described = [_joint(model, j, robot, limits) for j in range(1, model.njoints)]
-    described += [{"name": name, "axis": None} for name in robot.tip_frames]
+    described += [{"name": name, "axis": None, "tip": True} for name in robot.tip_frames]
     pairs = list(zip(described, tracks, strict=True))
     return tuple({**each, "at": _rounded(track)} for each, track in pairs[:_MAX_JOINTS])
 

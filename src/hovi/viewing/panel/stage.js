@@ -13,6 +13,7 @@ class Stage {
         this.light();
         this.floor();
         this.marks();
+        this.ends();
         this.labels();
         this.resize();
         new ResizeObserver(() => this.resize()).observe(this.pane);
@@ -98,6 +99,59 @@ class Stage {
             if (arc !== null) { group.add(arc.whole); }
             this.frames.push({ joint, frame, arc });
         }
+    }
+
+    // Frames of the tips at the start and at the goal, with their names.
+    ends() {
+        const size = this.panel.size, group = this.node(["Ends"]);
+        group.position.set(...this.panel.shift);
+        for (const tip of this.panel.joints.filter(joint => joint.tip)) {
+            const first = tip.at[0], last = tip.at[tip.at.length - 1];
+            const apart = Math.max(...first.map((x, i) => Math.abs(x - last[i]))) > 1e-3 * size;
+            group.add(this.end(first, apart ? "start" : "start and goal", 0x1d2733));
+            if (apart) { group.add(this.end(last, "goal", 0x003f73)); }
+        }
+    }
+
+    // A frame of three bars, red, green and blue, at a pose, and a name that always faces the camera.
+    end(pose, name, color) {
+        const T = this.THREE, size = this.panel.size, length = 0.1 * size, frame = new T.Group();
+        frame.position.set(pose[0], pose[1], pose[2]);
+        frame.quaternion.set(pose[3], pose[4], pose[5], pose[6]);
+        const solid = (geometry, paint) => {
+            const made = new T.Mesh(geometry, new T.MeshBasicMaterial({ color: paint }));
+            frame.add(made);
+            return made;
+        };
+        [0xc8372d, 0x2e8b3d, 0x2f5fc4].forEach((paint, k) => {
+            const bar = solid(new T.CylinderGeometry(0.005 * size, 0.005 * size, length, 8), paint);
+            bar.position.setComponent(k, 0.5 * length);
+            if (k === 0) { bar.rotation.z = -Math.PI / 2; }
+            if (k === 2) { bar.rotation.x = Math.PI / 2; }
+        });
+        solid(new T.SphereGeometry(0.012 * size, 12, 8), color);
+        const whole = new T.Group(), label = this.text(name, color);
+        label.position.set(pose[0], pose[1], pose[2]);
+        whole.add(frame, label);
+        return whole;
+    }
+
+    text(words, color) {
+        const T = this.THREE, canvas = document.createElement("canvas"), ink = canvas.getContext("2d");
+        const font = "600 44px system-ui, 'Segoe UI', Roboto, 'DejaVu Sans', sans-serif";
+        ink.font = font;
+        [canvas.width, canvas.height] = [Math.ceil(ink.measureText(words).width) + 24, 64];
+        ink.font = font;
+        [ink.lineWidth, ink.lineJoin, ink.textBaseline, ink.strokeStyle] = [6, "round", "middle", "#fff"];
+        ink.strokeText(words, 12, 32);
+        ink.fillStyle = `#${color.toString(16).padStart(6, "0")}`;
+        ink.fillText(words, 12, 32);
+        const map = new T.CanvasTexture(canvas);
+        const sprite = new T.Sprite(new T.SpriteMaterial({ map, depthTest: false }));
+        const height = 0.07 * this.panel.size;
+        sprite.scale.set(height * canvas.width / canvas.height, height, 1);
+        sprite.center.set(0.5, -0.35);
+        return sprite;
     }
 
     // The range of a hinge in the plane normal to its axis, and the part on this side of zero.
@@ -215,6 +269,29 @@ class Stage {
         const whole = MeshCat.Viewer.prototype.set_3d_pane_size;
         whole.call(this.viewer, Math.max(this.pane.clientWidth, 1), Math.max(this.pane.clientHeight, 1));
         if (!this.turned) { this.look(); }
+    }
+
+    // The camera in a direction of the world's frame, as near as the motion allows.
+    look_from(direction) {
+        this.panel.view = direction;
+        this.turned = false;
+        this.look();
+    }
+
+    // The camera at a point of the world's frame, looking at another one: the middle for null.
+    stand(position, target) {
+        const T = this.THREE, camera = this.viewer.camera, shift = new T.Vector3(...this.panel.shift);
+        const page = p => { const q = new T.Vector3(...p).add(shift); return new T.Vector3(q.x, q.z, -q.y); };
+        this.turned = true;
+        camera.fov = 32;
+        camera.position.copy(page(position));
+        this.viewer.controls.target.copy(target === null ? new T.Vector3() : page(target));
+        const distance = camera.position.distanceTo(this.viewer.controls.target);
+        camera.near = Math.min(0.01 * distance, 0.1);
+        camera.far = 20 * Math.max(distance, this.panel.size);
+        this.viewer.controls.update();
+        camera.updateProjectionMatrix();
+        this.viewer.set_dirty();
     }
 
     // The camera as near as the box that the motion sweeps allows, in a window of any shape.

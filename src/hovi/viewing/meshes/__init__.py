@@ -1,0 +1,1 @@
+"""Meshes as pages draw them: few triangles, near the original ones."""
