@@ -211,7 +211,10 @@ class BoundedAction(BoundedObjective[DiscretePath]):
                 parts = zip(terms, self._parts, strict=True)
                 terms = [dataclasses.replace(t, time_gradient=rates[p]) for t, p in parts]
         known = self.action.multipliers
-        return terms if known is None else known.added_to(terms)
+        if known is not None:
+            terms = known.added_to(terms)
+            self.action.equations.add_forces(terms, known.conditions, self.action.jets(x))
+        return terms
 
     @property
     def _timed(self) -> bool:

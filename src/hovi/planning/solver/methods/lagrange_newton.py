@@ -98,7 +98,7 @@ def _answer(objective: ConstrainedAction, found: Ended[DiscretePath, Array]) -> 
     if found.why is Reason.INFEASIBLE:
         reason = unmet_sentence(problem, x, residuals)
     status, message = _status(problem, found, reason, cost, nit, n_neg)
-    forces, jets = objective.multipliers(found.z).forces, objective.action.jets(x)
+    forces, jets = objective.forces(found.z, x), objective.action.jets(x)
     return Answer(problem, x, cost, status, message, nit, n_neg, found.steps, forces, jets=jets)
 
 
