@@ -33,6 +33,7 @@ WITH_ORACLES = {
     "optimize/test_small_problems.py",
     "oracles/on_grid.py",
     "planning/conditions/test_derivatives.py",
+    "planning/refinement/test_candidate.py",
     "planning/refinement/test_hp_refinement.py",
     "planning/solver/free_duration/test_parts_of_free_length.py",
     "planning/solver/limits/test_limit_rows.py",
