@@ -889,13 +889,6 @@ _rule(
 )
 _at("refinement", "planning.refinement.adaptive")
 _rule(
-    "begin again with more points",
-    "A first grid of few points far from a finer motion is replaced by one of more points.",
-    "Refinement._refine",
-    "self.restart is not None and _hides(candidate)",
-    "False",
-)
-_rule(
     "central path on another grid",
     "Among obstacles a solve on another grid begins on the last central path.",
     "_along",
@@ -1018,13 +1011,6 @@ _rule(
     "True",
 )
 _rule(
-    "more points where none is found",
-    "Where the first grid has no minimum, one with more points is tried.",
-    "Search._run",
-    "self._needs_more_points(explored)",
-    "False",
-)
-_rule(
     "nodes where joints speed up",
     "Where a duration seems too short, nodes are put where joints speed up and slow down.",
     "Search._on_finer_grid",
@@ -1069,13 +1055,6 @@ _rule(
     False,
 )
 _at("search", "planning.search.job")
-_rule(
-    "few points at first",
-    "A single start of a smooth motion begins with few points per interval.",
-    "grid_of",
-    "options.starts == 1 and not free and not isinstance(guess, Trajectory)",
-    "False",
-)
 _rule(
     "grid of the guess",
     "A refinement begins on the grid of a given motion if that is finer.",

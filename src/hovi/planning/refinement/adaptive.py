@@ -26,7 +26,6 @@ from hovi.planning.refinement.next_grid import interpolated_to, next_grid
 from hovi.planning.solver.central_path import CentralPath
 from hovi.planning.solver.solver import Solution, solved_on_grid
 from hovi.planning.solver.status import Status
-from hovi.schemes import galerkin
 from hovi.system.blas_threads import one_blas_thread
 from hovi.system.dataclass import dataclass
 from hovi.system.deadline import Deadline, OutOfTimeError
@@ -46,8 +45,6 @@ FIRST_MODES = 4
 """Inner modes of the intervals of the first grid of a smooth motion."""
 SMOOTH_INTERVALS = 2, 3
 """Quotient of the intervals of the first grid of a smooth motion and those of another one."""
-RESTART_ERROR = 0.05
-"""Relative error of the first cost above which the refinement begins again with more points."""
 MAX_ROUNDS = 14
 """Maximum number of grids."""
 MAX_STALLED_ROUNDS = 2
@@ -59,24 +56,21 @@ MAX_POINTS = 400_000
 """Number of quadrature points of a grid above which no finer one is tried."""
 
 
-def first_grid(
-    duration: float, intervals: int, smooth: bool = True, more_points: bool = True, order: int = 2
-) -> Grid:
+def first_grid(duration: float, intervals: int, smooth: bool = True, order: int = 2) -> Grid:
     """The first grid: galerkin-2x8 on the intervals, or galerkin-4x10 on two thirds of them.
 
     More points leave the torque no room to hide between them. With more modes the errors of smooth
     motions are smaller, and the decay of the modes can be estimated.
     duration: T, in [s]. intervals: at most MAX_FIRST_INTERVALS are used. smooth: whether the
-        motion has no kinks, which limits and via points cause. more_points: False for galerkin-4,
-        which suffices for a smooth motion that the grid resolves. order: k of the Lagrangian.
+        motion has no kinks, which limits and via points cause. order: k of the Lagrangian.
     Raises InputError as Grid.uniform does.
     """
     number = min(intervals, MAX_FIRST_INTERVALS)
     if not smooth:
         return Grid.uniform(duration, number, galerkin_with_more_points(2, order))
     few, many = SMOOTH_INTERVALS
-    table = galerkin_with_more_points if more_points else galerkin
-    return Grid.uniform(duration, max(few * number // many, 1), table(FIRST_MODES, order))
+    table = galerkin_with_more_points(FIRST_MODES, order)
+    return Grid.uniform(duration, max(few * number // many, 1), table)
 
 
 @one_blas_thread
@@ -112,15 +106,12 @@ class Refinement:
     """The rounds of a refinement to a tolerance, with their common limits on steps and time.
 
     max_iterations, on_round: as for `solve_to_tolerance`. deadline: of all rounds.
-    restart: returns the solution to begin with if the given one is not near a finer one; None to
-        keep the given one.
     """
 
     tolerance: Tolerance
     max_iterations: int
     deadline: Deadline
     on_round: OnRound | None = None
-    restart: Callable[[], Solution] | None = None
     rounds: list[Round] = field(default_factory=list)
     best: Candidate = field(init=False)
 
@@ -143,8 +134,6 @@ class Refinement:
 
     def _refine(self, candidate: Candidate) -> str:
         """Run the rounds after the first; returns why they ended early, or ""."""
-        if self.restart is not None and _hides(candidate):
-            candidate = self.best = self._evaluated(self.restart())
         stalled = 0
         while not candidate.within_tolerance:
             reason = self._stop_reason(candidate, stalled)
@@ -309,9 +298,3 @@ def _along(
     if central is None or problem.distances is None:
         return None
     return central.resampled(known, problem)
-
-
-def _hides(candidate: Candidate) -> bool:
-    """Whether a motion on few points is not near a finer one, so that its torque may hide."""
-    known = candidate.error_of_cost
-    return known is None or known > RESTART_ERROR

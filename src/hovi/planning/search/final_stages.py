@@ -17,7 +17,7 @@ from hovi.planning.problem.clock import Clock
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.problem.time_price import TimePrice
 from hovi.planning.problem.tolerance import Round, Tolerance
-from hovi.planning.refinement.adaptive import Refinement, first_grid
+from hovi.planning.refinement.adaptive import Refinement
 from hovi.planning.refinement.faults.narrow_features import features_of
 from hovi.planning.refinement.inactive_limits import (
     far_from_limits,
@@ -30,7 +30,6 @@ from hovi.planning.search.multistart import Pool, default_processes, distinct
 from hovi.planning.solver.initial_path import guess_path
 from hovi.planning.solver.solver import Solution, solved_on_grid
 from hovi.planning.solver.status import Status
-from hovi.schemes import is_galerkin
 from hovi.system.dataclass import dataclass
 from hovi.system.deadline import Deadline
 from hovi.system.interruption import interrupted
@@ -42,7 +41,6 @@ if TYPE_CHECKING:
 
 Array = npt.NDArray[np.float64]
 
-NAMED_GUESSES = ("cubic", "minimum-jerk")
 MAX_CHART_ROUNDS = 4
 """Maximum number of rounds that halve intervals in which an orientation turns too far."""
 MAX_REFINED = 6
@@ -191,7 +189,6 @@ class FinalStages:
             self.fine.options.max_iterations,
             self.deadline,
             partial(self._report_round, which),
-            self._from_guess if has_few_points(self.fine) else None,
         )
         if far_from_limits(known):
             better = with_limits_again(refinement().run(without_limits(known)), known)
@@ -222,15 +219,6 @@ class FinalStages:
             refined = self.refined(tolerance, "", again)
             best = refined if refined.success else best
         return best
-
-    def _from_guess(self) -> Solution:
-        """A solve from the guess on the first grid with more quadrature points."""
-        job = with_more_points(self.fine)
-        left, most = self.deadline.seconds_left, job.options.max_iterations
-        guess, barrier = job.options.guess, job.barrier
-        return solved_on_grid(
-            job.problem(), guess, max_iterations=most, time_limit=left, barrier=barrier
-        )
 
     def _report_round(self, which: str, done: Round) -> None:
         text = f"{which}{done.intervals} intervals, estimated error {done.error:.1e}"
@@ -309,20 +297,6 @@ def with_tolerance(found: Solution, tolerance: Tolerance) -> Solution:
     accuracy = dataclasses.replace(known, tolerance=tolerance)
     message = found.message.replace(str(known), str(accuracy))
     return dataclasses.replace(found, accuracy=accuracy, message=message)
-
-
-def has_few_points(job: Job) -> bool:
-    """Whether a refinement to a tolerance begins with as many points as a smooth motion needs."""
-    scheme = job.grid.schemes[0]
-    few = is_galerkin(scheme) and len(scheme.points) == scheme.inner_modes + scheme.derivatives
-    kept = job.problem().limited or job.options.guess not in NAMED_GUESSES
-    return job.tolerance is not None and few and not kept
-
-
-def with_more_points(job: Job) -> Job:
-    """The job on the first grid with more quadrature points."""
-    grid = first_grid(job.grid.duration, job.options.interval_count, order=job.grid.order)
-    return split_for_charts(job.on(job.graded(grid)), job.options.guess)
 
 
 def on_grid_of(problem: TrajectoryProblem, solution: Solution) -> TrajectoryProblem:

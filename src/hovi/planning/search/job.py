@@ -272,11 +272,10 @@ def split_for_charts(job: Job, guess: str | Trajectory) -> Job:
         job = job.on(job.grid.halved())
 
 
-def grid_of(T: float, options: PlanOptions, scene: Scene, free: bool) -> Grid:
+def grid_of(T: float, options: PlanOptions, scene: Scene) -> Grid:
     """The requested grid, or the first grid of the refinement to a tolerance.
 
     The latter is the guess's own grid if that is a finer one, so that the guess is not coarsened.
-    free: whether the duration is.
     """
     guess = options.guess
     if options.tolerance is None:
@@ -287,9 +286,7 @@ def grid_of(T: float, options: PlanOptions, scene: Scene, free: bool) -> Grid:
         limits = as_limits(scene.robot, options.limits)
         limited = limits.bounded.any() or limits.conditions or options.conditions
         kinks = limited or options.clearance.wanted or options.via
-        few = options.starts == 1 and not free and not isinstance(guess, Trajectory)
-        number, order = options.interval_count, scene.order
-        grid = first_grid(T, number, not kinks, more_points=not few, order=order)
+        grid = first_grid(T, options.interval_count, not kinks, scene.order)
     stops = [time for time in stops_of(options) if abs(time - T) > NODE_TOLERANCE * T]
     return grid.with_nodes(stops, options.intervals is None)
 

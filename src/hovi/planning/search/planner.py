@@ -318,7 +318,7 @@ class _Planning:
         T, options = self.duration, self.options
         if scene is None:
             scene = smoothed(self.scene, *ends, T) if options.smooth else self.scene
-        grid = grid_of(T, options, scene, self.free is not None)
+        grid = grid_of(T, options, scene)
         with deadline.in_force():
             scene.effort_lagrangian(options.weight)  # its functions may have to be compiled
             job = Job(scene, grid, *ends, options)

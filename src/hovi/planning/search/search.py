@@ -28,9 +28,7 @@ from hovi.planning.search.final_stages import (
     REFINING,
     FinalStages,
     ended_early,
-    has_few_points,
     on_grid_of,
-    with_more_points,
     with_tolerance,
 )
 from hovi.planning.search.free_duration import FreeDuration
@@ -150,19 +148,11 @@ class Search:
         """The best solution, and the costs of all minima, with all distances from the beginning."""
         job = self._coarse()
         explored = self._explored(job)
-        if self._needs_more_points(explored):
-            return dataclasses.replace(self, fine=with_more_points(self.fine))._run()
         if (again := self._on_finer_grid(explored)) is not None:
             return again._run()
         if self.free is None or explored.minima[0].success:
             return self._finished(job, explored)
         return self._from_another_duration(self.free, explored)
-
-    def _needs_more_points(self, explored: Exploration) -> bool:
-        """Whether a refinement found no minimum on the first grid, of tables with few points."""
-        found = explored.minima[0]
-        ended = found.success or found.status in STOPPED or interrupted()
-        return has_few_points(self.fine) and not ended
 
     def _on_finer_grid(self, explored: Exploration) -> Self | None:
         """The search once more where it called its problem infeasible, as its grid may be coarse.

@@ -34,7 +34,7 @@ OUTWEIGHED = 0.5
 class PenalizedAction(Objective[DiscretePath]):
     """action + penalty/2 (sum weights (distance outside the bounds)^2 + |c|^2).
 
-    limited: with the same penalty of its equations c, and multipliers that are zero.
+    limited: with the same penalty of its equations c; terms of its multipliers count as action.
     """
 
     def __init__(self, limited: BoundedAction, penalty: float) -> None:

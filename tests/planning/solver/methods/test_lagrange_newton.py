@@ -233,12 +233,17 @@ def test_a_goal_that_is_stated_twice_changes_nothing() -> None:
     np.testing.assert_allclose(twice.trajectory.q, once.trajectory.q, rtol=0, atol=1e-6)
 
 
-def rod(load: float, held: bool) -> hovi.TrajectoryProblem:
-    """A rod under a load along it, straight: 1/2 q''^2 - load/2 q'^2 + q'^4; t is its length."""
-    q, v, a = (ca.SX.sym(name, 1) for name in "qva")
-    energy = ca.dot(a, a) / 2 - load * ca.dot(v, v) / 2 + ca.dot(v, v) ** 2
+def bending(load: float, rods: int = 1) -> hovi.DiscreteLagrangian:
+    """The energy 1/2 q''^2 - load/2 q'^2 + q'^4 of rods under a load; t is the length."""
+    q, v, a = (ca.SX.sym(name, rods) for name in "qva")
+    energy = ca.dot(a, a) / 2 - load * ca.dot(v, v) / 2 + ca.sumsqr(v**2)
     grid = hovi.Grid.uniform(1.0, 20, hovi.schemes.galerkin(2))
-    ld = hovi.DiscreteLagrangian(hovi.CasadiLagrangian([q, v, a], energy), grid)
+    return hovi.DiscreteLagrangian(hovi.CasadiLagrangian([q, v, a], energy), grid)
+
+
+def rod(load: float, held: bool) -> hovi.TrajectoryProblem:
+    """A rod under a load along it, straight."""
+    ld = bending(load)
     via = (hovi.Via(0.5, hovi.State([0.0])),) if held else ()
     return hovi.TrajectoryProblem(ld, hovi.State([0.0]), hovi.State([0.0]), via=via)
 
@@ -365,3 +370,18 @@ def test_replanning_to_a_goal_turned_by_half_a_turn_does_not_stay_where_it_is() 
     again = posed().replan(goal=hovi.FrameGoal("tool0", pose))
     assert again.success, again.message
     np.testing.assert_allclose(tool(again.trajectory.q[-1]), pose, rtol=0, atol=1e-9)
+
+
+def test_rods_that_bend_alike_leave_the_saddle_where_newtons_method_ends() -> None:
+    """With an equation at all times it begins without a penalty, at the straight rods."""
+    alike = hovi.Condition(lambda q: q[0] - q[1], hovi.Equal(0.0))
+    ends = hovi.State(np.zeros(2)), hovi.State(np.zeros(2))
+    problem = hovi.TrajectoryProblem(bending(50.0, rods=2), *ends, conditions=(alike,))
+    straight = solve(problem, escape_saddles=False)
+    assert (straight.status, straight.n_neg) == (Status.SADDLE, 1)
+    bent = solve(problem)
+    assert bent.status is Status.MINIMUM
+    assert bent.cost == pytest.approx(2 * solve(rod(50.0, held=False)).cost, rel=1e-9)
+    assert np.abs(bent.trajectory.q).max() > 0.1
+    np.testing.assert_allclose(bent.trajectory.q[:, 0], bent.trajectory.q[:, 1], atol=1e-9)
+    assert "A saddle of cost 0 was left" in bent.message

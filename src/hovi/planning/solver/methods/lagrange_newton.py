@@ -11,6 +11,7 @@ import numpy.typing as npt
 from hovi.discrete.grid import DiscretePath
 from hovi.optimize.criteria import Criteria
 from hovi.optimize.ended import Ended, Reason
+from hovi.optimize.interior_point import MAX_SADDLES
 from hovi.optimize.lagrange_newton import minimize_under_equations
 from hovi.optimize.start import Start
 from hovi.optimize.trust_region import minimize
@@ -27,7 +28,6 @@ from hovi.planning.solver.missed_equations import (
     unmet_sentence,
     within,
 )
-from hovi.planning.solver.multipliers import Multipliers
 from hovi.planning.solver.outcome.cost_with_time import price_of_time
 from hovi.planning.solver.penalized_action import PenalizedAction
 from hovi.planning.solver.status import Status, status_of
@@ -70,15 +70,50 @@ class LagrangeNewton(Method):
 def _minimized(
     objective: ConstrainedAction, start: Guess, criteria: Criteria, report: Report | None
 ) -> Ended[DiscretePath, Array]:
-    """The end of Newton's method, with the steps that led to where it began."""
+    """The end of Newton's method, with the steps that led to where it began.
+
+    From a saddle it begins again with a penalty and the multipliers there: negative curvature on
+    the tangent space of the equations is one of the penalized action, too.
+    """
     deadline, begin = Deadline(criteria.time_limit), Start(start.x, _multipliers(start, objective))
     if begin.z is not None or objective.problem.along or len(objective.problem.passive) > 0:
-        return minimize_under_equations(objective, begin, criteria, report)
-    first, known = _with_penalty(objective, start, criteria, report)
+        found = minimize_under_equations(objective, begin, criteria, report)
+    else:
+        none = np.zeros(sum(objective.equations.sizes))
+        found = _through_penalty(objective, Start(start.x, none), criteria, report)
+    for _ in range(MAX_SADDLES if criteria.escape_saddles else 0):
+        steps, saddles = found.steps, found.saddles
+        more = criteria.max_iterations - len(steps)
+        if more <= 0 or _negative_eigenvalues(objective, found) <= 0:
+            break
+        left = dataclasses.replace(criteria, time_limit=deadline.seconds_left, max_iterations=more)
+        on_step = _with_offset(report, len(steps))
+        found = _through_penalty(objective, Start(found.x, found.z), left, on_step)
+        found.steps, found.saddles = steps + found.steps, saddles + found.saddles
+    return found
+
+
+def _through_penalty(
+    objective: ConstrainedAction,
+    start: Start[DiscretePath, Array],
+    criteria: Criteria,
+    report: Report | None,
+) -> Ended[DiscretePath, Array]:
+    """The end of Newton's method from where a minimisation with a penalty leads.
+
+    There equations at nodes nearly hold, and multipliers are known. start.z: those of its terms.
+    """
+    deadline, problem, z = Deadline(criteria.time_limit), objective.problem, start.z
+    assert z is not None
+    known = objective.multipliers(z)
+    free = BoundedAction(problem, no_limits(problem.coordinates), multipliers=known)
+    rough = dataclasses.replace(criteria, decrease=FIRST_DECREASE)
+    first = minimize(PenalizedAction(free, objective.penalty), Start(start.x), rough, report)
     if first.why is Reason.STATIONARY:
         left = dataclasses.replace(criteria, time_limit=deadline.seconds_left)
+        near = Start(first.x, z + objective.penalty * free.residual(first.x))
         on_step = _with_offset(report, len(first.steps))
-        found = minimize_under_equations(objective, Start(first.x, known), left, on_step)
+        found = minimize_under_equations(objective, near, left, on_step)
     else:
         there = objective.evaluate(first.x)
         found = Ended(first.x, there, np.zeros_like(there.y), first.why)
@@ -123,18 +158,6 @@ def _multipliers(start: Guess, objective: ConstrainedAction) -> Array | None:
     step, _ = factor.solve(-model.gradient, -there.y)
     decrease = 0.5 * abs(model.curvature(step))
     return known if decrease <= FIRST_DECREASE * abs(there.value) else None
-
-
-def _with_penalty(
-    objective: ConstrainedAction, start: Guess, criteria: Criteria, report: Report | None
-) -> tuple[Ended[DiscretePath, None], Array]:
-    """A motion near a minimum, where equations at nodes hold nearly, and its multipliers."""
-    problem, none = objective.problem, Multipliers.zero(objective.equations)
-    free = BoundedAction(problem, no_limits(problem.coordinates), multipliers=none)
-    penalized = PenalizedAction(free, objective.penalty)
-    rough = dataclasses.replace(criteria, decrease=FIRST_DECREASE)
-    ended = minimize(penalized, Start(start.x), rough, report)
-    return ended, objective.penalty * free.residual(ended.x)
 
 
 def _with_offset(report: Report | None, done: int) -> Report | None:
