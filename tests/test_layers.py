@@ -32,12 +32,8 @@ WITH_ORACLES = {
     "optimize/test_merge_tree.py",
     "optimize/test_small_problems.py",
     "oracles/on_grid.py",
-<<<<<<< HEAD
     "conditions/test_derivatives.py",
-=======
-    "planning/conditions/test_derivatives.py",
     "planning/refinement/test_candidate.py",
->>>>>>> 30ef53f5f31aecca13f2f70bb3c2561d3b0168f6
     "planning/refinement/test_hp_refinement.py",
     "planning/solver/free_duration/test_parts_of_free_length.py",
     "planning/solver/limits/test_limit_rows.py",

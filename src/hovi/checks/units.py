@@ -20,6 +20,8 @@ FRACTIONS = {"": 1.0, "%": 1e-2}
 """Units of relative errors, in 1."""
 DURATIONS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0, "h": 3600.0}
 """Units of durations, in [s]."""
+TINIEST = 1e-9
+"""Least measure, and one over the largest, in SI units: squares of others lose all digits."""
 _TEXT = re.compile(r"([0-9.]+(?:[eE][+-]?[0-9]+)?)\s*([^\W\d]*|%)")
 _MEASURE = re.compile(r"([0-9]*\.?[0-9]+(?:[eE][+-]?[0-9]+)?)\s*([a-z]*(?:/s(?:\^2)?)?)")
 
@@ -105,12 +107,13 @@ def _measure(given: Any, what: str, units: Mapping[str, float], of: str, such: s
         number, unit = (float(parsed[1]), parsed[2]) if parsed else (None, "")
         if parsed and unit not in units:
             raise InputError(f"{what} {given!r} has the unit {unit!r}: {nearest(unit, units)}")
-    if not is_number(number) or not 0 < _as_double(number, what) * units[unit] < math.inf:
+    size = _as_double(number, what) * units[unit] if is_number(number) else math.nan
+    if not TINIEST <= size <= 1.0 / TINIEST:
         raise InputError(
             f"{what} must be a positive number of {of} or a text such as {such!r}, got "
             f"{shown(given)}."
         )
-    return float(number) * units[unit]
+    return size
 
 
 def as_time_limit(given: float | str | None) -> float | None:
