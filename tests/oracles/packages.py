@@ -46,7 +46,7 @@ INSIDE = {
         {"sequence"},
         {"task_file"},
     ],
-    "viewing": [{"curves"}, {"panel"}, {""}, {"documents"}],
+    "viewing": [{"curves", "meshes"}, {"panel"}, {""}, {"documents"}],
     "accuracy": [{""}, {"effect_study", "peers"}],
     "study": [{"cells"}, {"axes"}, {"storage"}, {"running"}, {""}, {"showing"}],
     "exchange": [{""}, {"film"}],
