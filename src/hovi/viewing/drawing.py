@@ -50,6 +50,8 @@ _VIEW_SAMPLES = 60
 _TRACE_SAMPLES = 2_000  # to measure a path by
 _TRACE_SPACING = 0.15  # of the points that draw it, relative to their width
 _TRACE_POINTS = 8_000
+_KEPT_COLOR = (0.10, 0.45, 0.70)
+_KEPT_WIDTH, _KEPT_SPACING = 0.4, 0.3  # relative to the width of a trace
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,6 +102,11 @@ def drawn(
         width = _TRACE_WIDTH * float(np.linalg.norm(upper - lower))
         paths = _tip_paths(trajectory, robot, width)
         _draw_trace(viewer["trace"], paths, width, _TRACE_COLOR)
+        if trajectory.metadata.get("keep"):
+            from hovi.viewing.kept_marks import kept_marks  # most motions keep nothing
+
+            marks = kept_marks(trajectory, robot, _KEPT_SPACING * width)
+            _draw_trace(viewer["kept"], marks, _KEPT_WIDTH * width, _KEPT_COLOR)
         for k, (each, other) in enumerate(others, start=1):
             paths = _tip_paths(each, other, width)
             _draw_trace(viewer[f"trace/{k}"], paths, width, _rgb(ghost_color(k)))
