@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import casadi as ca
@@ -312,6 +313,16 @@ def test_free_durations_of_segments_that_keep_something_are_solved_jointly() -> 
     assert near.cost + 200.0 * near.trajectory.duration > found.cost
 
 
+def test_a_report_has_what_is_kept_in_the_words_of_a_scene_file(tmp_path: Path) -> None:
+    from hovi.planning.task_file.motion_task import task_of_motion
+
+    task = task_of_motion(kept("line and upright").trajectory, None)
+    read = hovi.load_task(hovi.save_task(task, tmp_path / "kept.toml"))
+    again = hovi.plan_task(read.with_options(self_collision=False, limits="urdf"))
+    assert again.success, again.message
+    assert np.isclose(again.cost, kept("line and upright").cost, rtol=1e-5)
+
+
 def test_the_whole_sequence_keeps_what_all_of_it_does() -> None:
     found = sequence(keep=[Upright(FRAME, axis=DOWN, within="30 deg")])
     require_kept(found)
@@ -335,7 +346,22 @@ def test_a_part_of_a_motion_is_kept() -> None:
     assert rates(poses(slow.trajectory, t)[:, :3, 3], t).max() > 0.3
 
 
-def test_a_sum_along_the_way_of_parts_that_meet_is_asked_once() -> None:
+def test_a_part_begins_at_a_node() -> None:
+    plane = hovi.Condition("q", hovi.Between(upper=9.0), name="few", during=(0.5, 0.7))
+    lagrangian = scene().effort_lagrangian()
+    goal = hovi.State(START + 0.1)
+
+    def problem(grid: hovi.Grid) -> hovi.TrajectoryProblem:
+        ld = hovi.DiscreteLagrangian(lagrangian, grid)
+        return hovi.TrajectoryProblem(ld, hovi.State(START), goal, conditions=[plane])
+
+    grid = hovi.Grid.uniform(T, 8, hovi.schemes.by_name("galerkin-2"))
+    with pytest.raises(hovi.errors.InputError, match="until 0.5 s, where the grid needs a node"):
+        problem(grid)
+    assert problem(grid.with_nodes([0.5, 0.7])).conditions[0].during == (0.5, 0.7)
+
+
+def test_parts_that_meet_ask_once_where_they_do() -> None:
     halves = [OnPlane(FRAME, during=(0.0, 0.7)), OnPlane(FRAME, name="rest", during=(0.7, T))]
     found = planned(*halves)
     assert found.success, found.message

@@ -57,6 +57,20 @@ def require_ranges(given: Conditions, duration: float) -> None:
                 )
 
 
+def require_parts(given: Conditions, grid: Grid) -> None:
+    """Raise InputError for a condition on a part of a motion that begins or ends at no node."""
+    T = grid.duration
+    for each in given:
+        for time in each.during or ():
+            nearest = float(grid.t[np.argmin(np.abs(grid.t - time))])
+            if 0.0 < time < T and abs(nearest - time) > NODE_TOLERANCE * T:
+                raise InputError(
+                    f"condition {each.name!r} holds from or until {time:g} s, where the grid needs "
+                    f"a node, and the nearest is at {nearest:g} s of {T:g} s: move a node there by "
+                    "`grid.with_nodes`."
+                )
+
+
 @lru_cache(maxsize=64)
 def empty_range(on: Between, duration: float) -> tuple[float, float, float] | None:
     """The first time at which a range is empty, and its bounds, of INSTANTS; None if none is."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from hovi.conditions.frame_rows import across
 from hovi.conditions.kept.keep import Keep
-from hovi.conditions.kept.kinds import as_kept
+from hovi.conditions.kept.kinds import recorded
 from hovi.conditions.kept.on_line import OnLine
 from hovi.conditions.kept.on_plane import OnPlane
 from hovi.discrete.trajectory import Trajectory
@@ -31,26 +31,13 @@ def kept_marks(trajectory: Trajectory, robot: Robot, spacing: float) -> Array:
     spacing: of the points, in [m]. Metadata may come from a file: what is invalid is left out.
     """
     found = [np.zeros((0, 3))]
-    for each in _recorded(trajectory):
+    for each in recorded(trajectory.metadata):
         try:
             path = _path(trajectory, robot, each)
             found += [_between(a, b, spacing) for a, b in _edges(each, path)]
         except HoviError:
             continue
     return np.concatenate(found)
-
-
-def _recorded(trajectory: Trajectory) -> Sequence[Keep]:
-    given = trajectory.metadata.get("keep")
-    if not isinstance(given, list) or not all(isinstance(each, Mapping) for each in given):
-        return ()
-    found = list[Keep]()
-    for each in given:
-        try:
-            found += as_kept(each)
-        except HoviError:
-            continue
-    return found
 
 
 def _path(trajectory: Trajectory, robot: Robot, kept: Any) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, fields
 from typing import Any
@@ -17,7 +18,7 @@ from hovi.conditions.kept.row import Formula
 from hovi.conditions.kept.together import Together
 from hovi.conditions.kept.tool_speed import ToolAcceleration, ToolSpeed
 from hovi.conditions.kept.upright import Upright
-from hovi.errors import InputError, nearest
+from hovi.errors import HoviError, InputError, nearest
 
 _PLACES = Upright, OnLine, OnPlane, KeepOrientation, KeepPose, Together, Follow
 _OTHERS = ToolSpeed, ToolAcceleration, Formula
@@ -41,6 +42,16 @@ def as_kept(given: Any) -> tuple[Keep, ...]:
         if titles.count(title) > 1:
             raise InputError(f"keep has {title!r} twice; give each its own `name`.")
     return found
+
+
+def recorded(metadata: Mapping[str, Any]) -> tuple[Keep, ...]:
+    """What a motion's metadata say that it keeps, without what is invalid: files may say it."""
+    given, found = metadata.get("keep"), list[Keep]()
+    for number, table in enumerate(given if isinstance(given, list) else ()):
+        if isinstance(table, Mapping):
+            with contextlib.suppress(HoviError):
+                found.append(kept_of_table(table, f"keep[{number}]"))
+    return tuple(found)
 
 
 def _one(given: Keep | Mapping[str, Any], name: str) -> Keep:

@@ -18,6 +18,7 @@ from hovi.conditions.asked import (
     asked_at_nodes,
     bounded_of,
     checked,
+    require_parts,
     require_ranges,
 )
 from hovi.conditions.condition import (
@@ -125,6 +126,7 @@ class TrajectoryProblem(ProblemSummary):
             raise InputError("periodic motions have no via points or passive joints: omit them.")
         object.__setattr__(self, "conditions", checked(self.conditions, self.coordinates))
         require_ranges(self.bounds, self.grid.duration)
+        require_parts(self.conditions, self.grid)
         require_supported(self, self.ld.k)
         of, limits = self.ld.lagrangian, self.limits
         if limits is not None and limits.on_torque_rate and isinstance(of, JerkLagrangian):

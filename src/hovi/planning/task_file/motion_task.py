@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -17,6 +18,9 @@ from hovi.planning.search.options import PlanOptions
 from hovi.planning.sequence.segment import Segment
 from hovi.planning.task_file.task import Task
 from hovi.scene.scene import Scene
+
+if TYPE_CHECKING:
+    from hovi.conditions.kept.keep import Keep
 
 Array = npt.NDArray[np.float64]
 
@@ -49,6 +53,7 @@ def task_of_motion(
         obstacles=kept.obstacles,
         margin=kept.margin,
         self_collision=kept.self_collision,
+        keep=_kept(motion),
     )
     start = _state(motion, 0)
     if len(scenes) == 1:
@@ -67,6 +72,15 @@ def task_of_motion(
     ]
     shared = Scene(scenes[0].robot, common, passive=scenes[0].passive, begin=scenes[0].begin)
     return Task.of_segments(shared, start, segments, options)
+
+
+def _kept(motion: Trajectory) -> tuple[Keep, ...]:
+    """What it keeps, in the parts of it in which it does."""
+    if not motion.metadata.get("keep"):
+        return ()
+    from hovi.conditions.kept.kinds import recorded  # most motions keep nothing
+
+    return recorded(motion.metadata)
 
 
 def _named(limits: Limits, scene: Scene) -> Limits | str:
