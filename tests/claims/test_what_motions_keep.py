@@ -356,7 +356,7 @@ def test_a_part_begins_at_a_node() -> None:
         return hovi.TrajectoryProblem(ld, hovi.State(START), goal, conditions=[plane])
 
     grid = hovi.Grid.uniform(T, 8, hovi.schemes.by_name("galerkin-2"))
-    with pytest.raises(hovi.errors.InputError, match="until 0.5 s, where the grid needs a node"):
+    with pytest.raises(hovi.errors.InputError, match=r"until 0\.5 s, where the grid needs a node"):
         problem(grid)
     assert problem(grid.with_nodes([0.5, 0.7])).conditions[0].during == (0.5, 0.7)
 
