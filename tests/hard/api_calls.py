@@ -873,8 +873,6 @@ def _files() -> list[Call]:
         call(hovi.save_task, task, toml),
         call(hovi.write_csv, trajectory, folder() / "motion.csv", rate=100.0),
         call(hovi.export, trajectory, folder() / "all.csv", "csv", rate=50.0, efforts=False),
-        call(hovi.export, trajectory, folder() / "a.gif", size="64x64", camera="top", speed=9.0),
-        own(trajectory, "to_gif", folder() / "b.gif", 2.0, size="64x64", camera="top", speed=9.0),
         own(trajectory, "to_numpy", folder() / "all.npz", 50.0),
         own(trajectory, "to_joint_trajectory", folder() / "all.json", 50.0, efforts=True),
         own(trajectory, "to_mcap", folder() / "all.mcap", 50.0),
