@@ -936,8 +936,6 @@ def _files() -> list[Call]:
             **{"lookahead_time": 0.1, "gain": 300.0},
         ),
         own(_resting("panda"), "to_franka", folder() / "franka.csv", 1000.0),
-        call(hovi.export, trajectory, folder() / "a.gif", size="64x64", camera="top", speed=9.0),
-        own(trajectory, "to_gif", folder() / "b.gif", 2.0, size="64x64", camera="top", speed=9.0),
         own(trajectory, "to_numpy", folder() / "all.npz", 50.0),
         own(trajectory, "to_joint_trajectory", folder() / "all.json", 50.0, efforts=True),
         own(trajectory, "to_mcap", folder() / "all.mcap", 50.0),

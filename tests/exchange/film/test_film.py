@@ -91,10 +91,20 @@ def test_a_film_has_the_size_the_speed_and_the_camera_that_are_given(
 
 
 def test_a_size_a_camera_and_a_speed_are_checked(motion: Trajectory, tmp_path: Path) -> None:
-    for given in ("640", "640x", (640, 481), "62x62", "1922x1080", [640, 480, 3], 640, "640.5x2"):
+    for given in ("640", "640x", (640, 481), "126x480", "1922x1080", [640, 480, 3], 640, "640.5x2"):
         with pytest.raises(InputError, match="size of a film must be"):
             Shot.of(size=given)
-    for given in ("1,2", "1,2,3:4,5", "1,2,nan", [1, 2], [[1, 2, 3]] * 3, "1,2,3:4,5,6:7,8,9", 7):
+    for given in (
+        "1,2",
+        "1,2,3:4,5",
+        "1,2,nan",
+        [1, 2],
+        [[1, 2, 3]] * 3,
+        [1, 2, 3j],
+        [True] * 3,
+        "1,2,3:4,5,6:7,8,9",
+        7,
+    ):
         with pytest.raises(InputError, match="camera of a film is a view"):
             Shot.of(camera=given)
     with pytest.raises(InputError, match="there is no view 'tpo': did you mean 'top'"):

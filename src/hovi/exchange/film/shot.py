@@ -16,8 +16,8 @@ Point = tuple[float, float, float]
 
 SIZE = 640, 480
 """Width and height where none is given, in pixels."""
-SMALLEST, LARGEST = (64, 64), (1920, 1080)
-"""Bounds of the width and the height, in pixels."""
+SMALLEST, LARGEST = (128, 128), (1920, 1080)
+"""Bounds of the width and the height, in pixels; Chromium draws no picture of 64x64."""
 VIEWS: dict[str, Point] = {
     "front": (1.0, 0.0, 0.15),
     "side": (0.0, -1.0, 0.15),
@@ -92,7 +92,8 @@ def _points(given: Any) -> tuple[Point, Point | None]:
     """A position, and a target if there is one."""
     parts = [part.split(",") for part in given.split(":")] if isinstance(given, str) else given
     try:
-        numbers = np.array(parts, dtype=float)
+        numbers = np.array(parts)
+        numbers = numbers.astype(float) if numbers.dtype.kind in "iufU" else np.zeros(0)
     except (TypeError, ValueError):
         numbers = np.zeros(0)
     if numbers.shape not in ((3,), (1, 3), (2, 3)) or not np.isfinite(numbers).all():

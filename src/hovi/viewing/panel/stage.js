@@ -151,6 +151,7 @@ class Stage {
         const height = 0.07 * this.panel.size;
         sprite.scale.set(height * canvas.width / canvas.height, height, 1);
         sprite.center.set(0.5, -0.35);
+        sprite.renderOrder = 1;  // over the floor, which is transparent, too
         return sprite;
     }
 
