@@ -55,7 +55,7 @@ def page(size: tuple[int, int], motion: hovi.Trajectory, *others: hovi.Trajector
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "page.html"
         hovi.replay(motion, compare=others, html=file)
-        with headless_browser(Path(folder) / "profile", size) as tab:
+        with headless_browser(size) as tab:
             width, height = size
             metrics = {"deviceScaleFactor": 1, "mobile": width < 500}
             tab.call("Emulation.setDeviceMetricsOverride", width=width, height=height, **metrics)
