@@ -1,6 +1,6 @@
 """The outputs that pages show right after their code, from running that code.
 
-python docs/shown_outputs.py [PAGE.md ...]            print how they differ; of all lessons by default
+python docs/shown_outputs.py [PAGE.md ...]            print how they differ; by default of lessons
 python docs/shown_outputs.py [PAGE.md ...] --write    and put what the code prints in their place
 """
 

@@ -79,7 +79,7 @@ def script(page: Path) -> str:
 
 
 def run(page: Path, folder: Path) -> subprocess.CompletedProcess[str]:
-    """Run the script of a page in a folder with the bundled models, and hovi where pages have it."""
+    """Run the script of a page in a folder with the bundled models, and with hovi as pages do."""
     (folder / "models").symlink_to(TOP / "models")
     (folder / ".venv").symlink_to(sys.prefix)
     (folder / "typed.py").write_text(script(page))
