@@ -1,7 +1,7 @@
 """The outputs that pages show right after their code, from running that code.
 
-python docs/shown_outputs.py [PAGE.md ...]            print how they differ; by default of lessons
-python docs/shown_outputs.py [PAGE.md ...] --write    and put what the code prints in their place
+python docs/shown_outputs.py [PAGE ...]            print how they differ; by default of lessons
+python docs/shown_outputs.py [PAGE ...] --write    and put what the code prints in their place
 """
 
 from __future__ import annotations

@@ -82,10 +82,11 @@ def run(page: Path, folder: Path) -> subprocess.CompletedProcess[str]:
     """Run the script of a page in a folder with the bundled models, and with hovi as pages do."""
     (folder / "models").symlink_to(TOP / "models")
     (folder / ".venv").symlink_to(sys.prefix)
-    (folder / "typed.py").write_text(script(page))
+    file = (folder / "typed").with_suffix(".py")
+    file.write_text(script(page))
     path = {"PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"}
     return subprocess.run(
-        [sys.executable, "typed.py"],
+        [sys.executable, file.name],
         cwd=folder,
         env=os.environ | path,
         stdin=subprocess.DEVNULL,
