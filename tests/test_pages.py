@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
+import re
 from pathlib import Path
 
 import pytest
 import tomlkit
-from tests.oracles.documents import NOT_RUN, PART, blocks, script
+from tests.oracles.documents import NOT_RUN, PART, blocks, run, script, shown_outputs, with_outputs
 
 import hovi
 
 TOP = Path(__file__).resolve().parents[1]
 HOWTOS = sorted((TOP / "docs" / "howto").glob("*.md"))
-PAGES = [TOP / "README.md", *sorted((TOP / "docs").glob("*.md")), *HOWTOS]
-TYPED = [page for page in PAGES if script(page)]
+LESSONS = sorted((TOP / "docs" / "lessons").glob("[1-9]_*.md"))
+PAGES = [TOP / "README.md", *sorted((TOP / "docs").glob("*.md")), *HOWTOS, *LESSONS]
+SHOWING = [page for page in PAGES if list(shown_outputs(page))]
+TYPED = [page for page in PAGES if script(page) and page not in SHOWING]
 MOST_MARKS = 12
 """Blocks that may be left out."""
 
@@ -26,20 +26,16 @@ def test_the_code_of_a_page_runs(page: Path, tmp_path: Path) -> None:
     """As one script, in a folder with the bundled models, and with hovi where the README has it."""
     if page.stem == "video":
         pytest.importorskip("imageio_ffmpeg")
-    (tmp_path / "models").symlink_to(TOP / "models")
-    (tmp_path / ".venv").symlink_to(sys.prefix)
-    file = (tmp_path / "typed").with_suffix(".py")
-    file.write_text(script(page))
-    path = {"PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"}
-    done = subprocess.run(
-        [sys.executable, file.name],
-        cwd=tmp_path,
-        env=os.environ | path,
-        stdin=subprocess.DEVNULL,
-        capture_output=True,
-        text=True,
-    )
+    done = run(page, tmp_path)
     assert done.returncode == 0, (done.stdout[-3000:], done.stderr[-3000:])
+
+
+@pytest.mark.parametrize("page", SHOWING, ids=lambda page: page.stem)
+def test_the_code_of_a_page_runs_and_prints_what_the_page_shows(page: Path, tmp_path: Path) -> None:
+    """Otherwise run `python docs/shown_outputs.py --write`."""
+    done = run(page, tmp_path)
+    assert done.returncode == 0, (done.stdout[-3000:], done.stderr[-3000:])
+    assert with_outputs(page, done.stdout) == page.read_text()
 
 
 @pytest.mark.parametrize(
@@ -90,6 +86,27 @@ def test_the_readme_begins_with_ten_lines_that_run(monkeypatch: pytest.MonkeyPat
     (motion,) = shown
     assert isinstance(motion, hovi.Trajectory)
     assert names["solution"].success  # type: ignore[attr-defined]
+
+
+def test_lessons_are_the_first_pages_in_their_order() -> None:
+    names = [page.stem for page in LESSONS]
+    assert [name[0] for name in names] == list("12345")
+    lessons = (TOP / "docs" / "lessons" / "index.md").read_text()
+    contents = lessons.split("```{toctree}\n:hidden:\n\n")[1].split("```")[0]
+    assert contents.split() == names
+    assert all(f"({name}.md)" in lessons for name in names)
+    assert ":caption: Begin\n\nlessons/index\n" in (TOP / "docs" / "index.md").read_text()
+    assert "(docs/lessons/index.md)" in "".join((TOP / "README.md").read_text().split("\n## ")[0])
+    assert "(../lessons/index.md)" in (TOP / "docs" / "howto" / "index.md").read_text()
+
+
+@pytest.mark.parametrize("lesson", LESSONS, ids=lambda page: page.stem)
+def test_a_lesson_shows_what_its_code_prints_and_a_small_picture(lesson: Path) -> None:
+    assert len(list(shown_outputs(lesson))) >= 3
+    pictures = re.findall(r"!\[.+?\]\((.+?)\)", lesson.read_text(), re.S)
+    assert pictures
+    for picture in pictures:
+        assert 5e3 < (lesson.parent / picture).stat().st_size < 1e5, picture
 
 
 def test_the_first_picture_is_small() -> None:
