@@ -314,6 +314,7 @@ def _kept() -> list[Call]:
         build(c.KeepOrientation, frame="tip", quaternion_xyzw=[0, 0, 0, 1]),
         build(c.KeepOrientation, frame="tip", quaternion_wxyz=[1, 0, 0, 0]),
         build(c.KeepPose, frame="tip", axes=["x", "ry"], position=[0.3, 0, 0], rpy=[0, 0, 0]),
+        build(c.Together, frame="upper_arm", other="tip", position=[0.3, 0, 0], rpy=[0, 0.1, 0]),
         build(c.Follow, frame="tip", **poses, rpy=np.zeros((3, 3)), tolerance=1e-5, angle=1e-4),
         build(c.ToolSpeed, frame="tip", linear="250 mm/s", angular=0.5),
         build(c.ToolAcceleration, frame="tip", linear=2.0),

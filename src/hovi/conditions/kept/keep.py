@@ -67,7 +67,7 @@ class Keep(ABC):
     @check_arguments  # keeps the tracebacks of its errors short
     def __post_init__(self) -> None:
         """Raise InputError for a field of another type, and as `check_values`."""
-        check_fields(self, self.subject, InputError)
+        check_fields(self, f"keep {self.kind!r}", InputError)
         require_name(self.name, "a condition")
         if self.during is not None:
             require_part(self.during, self.subject)
