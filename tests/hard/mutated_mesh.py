@@ -20,6 +20,7 @@ from hovi.robot.loading import load_robot
 from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
 from hovi.viewing.replay_session import replay
+from oracles.offline_pages import content_of
 from oracles.opened_files import opened_files
 from samples.cubic_motion import cubic_motion
 from samples.meshes import NAMESPACE, collada, mesh_arm, obj
@@ -142,13 +143,10 @@ def _motion(robot: Robot) -> Trajectory:
 
 
 def _leaks(page: Path) -> bool:
-    """Whether the secret is on the page: messages are in base64, and so are images in them."""
-    content = page.read_bytes()
-    for line in content.split(b"\n"):
-        if line.startswith(b"for (const message of"):
-            parts = [base64.b64decode(each) for each in line.split(b'"')[1::2]]
-            return any(SECRET in each or base64.b64encode(SECRET)[:60] in each for each in parts)
-    raise AssertionError("the page has no messages")
+    """Whether the secret is on the page, in its messages or, in base64, in an image in them."""
+    content = content_of(page.read_text())
+    assert b"set_object" in content, "the page has no messages"
+    return SECRET in content or base64.b64encode(SECRET)[:60] in content
 
 
 # Ways to write the same name

@@ -278,6 +278,7 @@ def shown(robot):
 """
 FRAMES = """
 with shown("ur5") as page:
+    page.page.messages.add(Message("/large", "set_object", "", b"x" * 4_000_000))
     before = memory()
     browsers = [silent_browser(port_of(page)) for _ in range(48)]
     until(lambda: len(page.page._browsers) > 10)

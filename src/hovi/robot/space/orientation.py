@@ -37,7 +37,7 @@ def rotation_from(name: str, value: Any, of: str = "a frame goal") -> Array:
     if name == "rpy":
         note = rpy_in_degrees(numbers)
         if note:
-            warn(f"{of}: {note}.")
+            warn(f"{of}'s {note}.")
         return np.array(pin.rpy.rpyToMatrix(numbers))
     length = math.hypot(*numbers)
     if abs(length - 1.0) > NORM_TOLERANCE:
