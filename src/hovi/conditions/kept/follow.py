@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from math import factorial
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import casadi as ca
 import numpy as np
@@ -13,7 +13,6 @@ import pinocchio as pin
 from scipy.interpolate import make_interp_spline
 
 from hovi.checks.shapes import numbers_of
-from hovi.conditions.condition import Condition
 from hovi.conditions.frame_rows import rotation_rows
 from hovi.conditions.kept.keep import (
     DIRECTION_TOLERANCE,
@@ -23,8 +22,8 @@ from hovi.conditions.kept.keep import (
     as_angle,
     as_length,
     placement,
+    pose_kept,
 )
-from hovi.conditions.sets import Equal
 from hovi.errors import InputError
 from hovi.robot.robot import Robot
 from hovi.system.dataclass import dataclass
@@ -102,23 +101,17 @@ class Follow(KeepFrame):
         self.check(robot)
         (t, p, quaternions), at = self._path, placement(robot, self.frame)
         along = _spline(t, p)
+        turning = None if quaternions is None else _spline(t, quaternions)
 
         def position(q: ca.SX, t: ca.SX) -> ca.SX:
             return at(q)[1] - along(t)
 
-        room = as_length(self.tolerance, self.subject)
-        found: list[Condition[Any, Any]] = [
-            Condition(position, Equal(0.0), name=self.title, unit="m", tolerance=room)
-        ]
-        if quaternions is not None:
-            turning = _spline(t, quaternions)
+        def rotation(q: ca.SX, t: ca.SX) -> ca.SX:
+            assert turning is not None
+            return _turned_rows(at(q)[0], turning(t))
 
-            def rotation(q: ca.SX, t: ca.SX) -> ca.SX:
-                return _turned_rows(at(q)[0], turning(t))
-
-            name, room = f"{self.title} (turn)", as_angle(self.angle, self.subject)
-            found.append(Condition(rotation, Equal(0.0), name=name, unit="rad", tolerance=room))
-        return tuple(found)
+        turned = None if turning is None else rotation
+        return pose_kept(self, position, turned, self.tolerance, self.angle)
 
 
 def _spline(t: Array, x: Array) -> Callable[[ca.SX], ca.SX]:

@@ -219,11 +219,31 @@ def direction_kept(
 
 
 def _value(
-    title: str, offsets: Callable[[ca.SX], ca.SX], room: float, accepted: float, unit: str
+    title: str, offsets: Callable[..., ca.SX], room: float, accepted: float, unit: str
 ) -> Condition[Any, Any]:
     """Offsets that vanish, but for what is accepted, or the room if that is less."""
     tolerance = min(room, accepted) if room > 0 else accepted
     return Condition(offsets, Equal(0.0), name=title, unit=unit, tolerance=tolerance)
+
+
+def pose_kept(
+    kept: KeepFrame,
+    shifts: Callable[..., ca.SX] | None,
+    turns: Callable[..., ca.SX] | None,
+    tolerance: Room,
+    angle: Room,
+) -> Conditions:
+    """Shifts in [m] and sines of turns in [rad], columns, that vanish; None for those that do not.
+
+    tolerance, angle: by how much each may be missed between nodes.
+    """
+    found = list[Condition[Any, Any]]()
+    if shifts is not None:
+        found.append(_value(kept.title, shifts, 0.0, as_length(tolerance, kept.subject), "m"))
+    if turns is not None:
+        title = f"{kept.title} (turn)" if found else kept.title
+        found.append(_value(title, turns, 0.0, as_angle(angle, kept.subject), "rad"))
+    return tuple(found)
 
 
 def _plain(value: Any) -> Any:

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, ClassVar, Self
+from typing import ClassVar, Self
 
 import casadi as ca
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from hovi.conditions.condition import Condition
 from hovi.conditions.frame_rows import rotation_rows
 from hovi.conditions.kept.keep import (
     DIRECTION_TOLERANCE,
@@ -22,8 +21,8 @@ from hovi.conditions.kept.keep import (
     as_angle,
     as_length,
     placement,
+    pose_kept,
 )
-from hovi.conditions.sets import Equal
 from hovi.errors import InputError
 from hovi.robot.robot import Robot
 from hovi.robot.space.orientation import rotation_from
@@ -93,12 +92,5 @@ class KeepPose(KeepFrame):
         def turned(q: ca.SX) -> ca.SX:
             return (ca.DM(R.T) @ rotation_rows(at(q)[0], R))[turns]
 
-        found = list[Condition[Any, Any]]()
-        if shifts:
-            room = as_length(self.tolerance, self.subject)
-            found.append(Condition(shifted, Equal(0.0), name=self.title, unit="m", tolerance=room))
-        if turns:
-            name = f"{self.title} (turn)" if found else self.title
-            room = as_angle(self.angle, self.subject)
-            found.append(Condition(turned, Equal(0.0), name=name, unit="rad", tolerance=room))
-        return tuple(found)
+        asked = shifted if shifts else None, turned if turns else None
+        return pose_kept(self, *asked, self.tolerance, self.angle)

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any, ClassVar, Self
+from typing import ClassVar, Self
 
 import casadi as ca
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from hovi.conditions.condition import Condition
 from hovi.conditions.frame_rows import rotation_rows
 from hovi.conditions.kept.keep import (
     DIRECTION_TOLERANCE,
@@ -21,8 +20,8 @@ from hovi.conditions.kept.keep import (
     as_angle,
     as_length,
     placement,
+    pose_kept,
 )
-from hovi.conditions.sets import Equal
 from hovi.errors import InputError
 from hovi.robot.robot import Robot
 from hovi.robot.space.orientation import rotation_from
@@ -103,10 +102,4 @@ class Together(KeepFrame):
         def turned(q: ca.SX) -> ca.SX:
             return rotation_rows(first(q)[0].T @ second(q)[0], D)
 
-        room, angle = as_length(self.tolerance, self.subject), as_angle(self.angle, self.subject)
-        names = self.title, f"{self.title} (turn)"
-        found: list[Condition[Any, Any]] = [
-            Condition(apart, Equal(0.0), name=names[0], unit="m", tolerance=room),
-            Condition(turned, Equal(0.0), name=names[1], unit="rad", tolerance=angle),
-        ]
-        return tuple(found)
+        return pose_kept(self, apart, turned, self.tolerance, self.angle)

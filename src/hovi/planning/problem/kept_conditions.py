@@ -63,7 +63,6 @@ def conditions_kept(
     """The conditions of what is kept, resolved. duration: of the motion, in [s], or its bounds.
 
     start: of the motion, which enters what it misses; None for what begins later.
-
     Raises InputError where a frame or a value does not fit, and for a start that misses a value by
     more than what is entered.
     """
