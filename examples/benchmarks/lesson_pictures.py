@@ -64,21 +64,21 @@ def pick(names: dict[str, Any], folder: str) -> None:
 
 
 def accuracy(names: dict[str, Any], folder: str) -> None:
-    """Estimated and true errors of the cost against points, on two logarithmic axes."""
+    """Estimated and true errors of the cost against the tolerance, with the points of each."""
     plans, truth = names["plans"].values(), names["truth"]
     points = [plan.accuracy.rounds[-1].points for plan in plans]
     true = [abs(plan.cost / truth.cost - 1) for plan in plans]
     figure = Figure(figsize=(7.0, 3.6), layout="constrained")
     ax = figure.subplots()
-    ax.semilogy(points, true, "o-", color="#0072b2", label="true error")
-    ax.semilogy(
-        points, [p.error_estimate for p in plans], "x--", color="#d55e00", label="estimated"
-    )
-    for x, y, tolerance in zip(points, true, names["plans"], strict=True):
-        ax.annotate(f"asked for {tolerance:.0e}", (x, y), (8, 5), textcoords="offset points")
-    ax.set(xlabel="points of the last grid", ylabel="error of the cost, relative")
-    ax.set_xlim(55, 158)
-    ax.set_yticks(10.0 ** np.arange(-12, -2, 2))
+    asked, estimated = list(names["plans"]), [plan.error_estimate for plan in plans]
+    ax.loglog(asked, asked, color="0.6", label="tolerance")
+    ax.loglog(asked, true, "o-", color="#0072b2", label="true error")
+    ax.loglog(asked, estimated, "x--", color="#d55e00", label="estimated")
+    for x, y, count in zip(asked, true, points, strict=True):
+        ax.annotate(f"{count} points", (x, y), (-4, -16), textcoords="offset points", ha="right")
+    ax.set(xlabel="tolerance", ylabel="error of the cost, relative")
+    ax.set_xlim(2e-1, 2e-9)
+    ax.set_yticks(10.0 ** np.arange(-12, 0, 2))
     ax.spines[["top", "right"]].set_visible(False)
     ax.grid(axis="y", alpha=0.3)
     ax.legend(frameon=False)
