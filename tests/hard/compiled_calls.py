@@ -17,6 +17,7 @@ from pathlib import Path
 from random import Random
 from typing import Any
 
+import casadi as ca
 import coal
 import numpy as np
 import numpy.typing as npt
@@ -29,6 +30,7 @@ from hovi._native import (
     barrier,
     distances,
     dynamics,
+    expressions,
     groups,
     integration,
     intervals,
@@ -267,6 +269,22 @@ def _inputs(*names: str) -> dict[str, Kind]:
 
 _TARGETS = ("lower_targets", "upper_targets")
 _BARRIER: dict[str, Any] = {"letters": {"R": (0, 9)}}
+
+
+@cache
+def expression() -> Any:
+    """Two results of two arguments: operations of every kind, of 3 and 1 numbers."""
+    x, s = ca.SX.sym("x", 3), ca.SX.sym("s")
+    y = ca.vertcat(ca.dot(x, x) / (1.0 + s**2), ca.if_else(x[0] > s, ca.sin(x[1]), ca.sqrt(s)))
+    return expressions.expression_of(ca.Function("f", [x, s], [y, ca.densify(ca.jacobian(y, x))]))
+
+
+def _run(points: int, threads: int, **arrays: Array) -> None:
+    given, made = (
+        tuple(x for name, x in arrays.items() if name.startswith(kind))
+        for kind in ("argument", "result")
+    )
+    expression()(given, made, points, threads)
 
 
 def _still(t: float, y: Array) -> Array:
@@ -931,6 +949,22 @@ ENTRIES: dict[str, Entry] = {
         {"position": _in("3"), "axis": _in("2 3"), **_SEARCH},
         optional=("axis",),
         **_SEARCH_REST,
+    ),
+    "expressions.expression_of": Entry(
+        expressions.expression_of, {}, {"function": ca.Function("f", [ca.SX.sym("x")], [1.0])}
+    ),
+    "expressions.Expression": Entry(
+        _run,
+        {
+            **{"argument 0": _in("P 3"), "argument 1": _in("P 1")},
+            **{"result 0": _out("P 2"), "result 1": _out("P 6")},
+        },
+        {"points": 0, "threads": 2},
+        letters={"P": (0, 40)},
+        values=lambda arguments, sizes: arguments.update(points=sizes["P"]),
+        fits=lambda arguments, sizes: (
+            arguments["points"] == sizes["P"] and -(2**31) <= arguments["threads"] < 2**31
+        ),
     ),
     "distances.PairDistances": Entry(
         distances.PairDistances,

@@ -106,11 +106,11 @@ def test_random_changes_are_refused_where_they_contradict_the_rest(name: str) ->
 
 
 def test_every_compiled_function_is_among_the_entries() -> None:
-    from hovi._native import band, barrier, distances, dynamics, groups
+    from hovi._native import band, barrier, distances, dynamics, expressions, groups
 
     functions = {
         f"{module.__name__.rpartition('.')[2]}.{name}"
-        for module in (band, barrier, groups, intervals)
+        for module in (band, barrier, expressions, groups, intervals)
         for name in dir(module)
         if callable(getattr(module, name)) and not name.startswith("_")
     }

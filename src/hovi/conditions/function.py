@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from hovi.checks.arguments import check_arguments
+from hovi.checks.arguments import check_arguments, without_checks
 from hovi.scene.lagrangian import over_time
 from hovi.system.dataclass import dataclass
 
@@ -47,6 +47,9 @@ class Points:
         found = getattr(self, name)
         assert found is not None
         return np.asarray(found.reshape(len(self.q), -1))
+
+
+_new_points = without_checks(Points)  # called for each state
 
 
 class Function(ABC):
@@ -229,4 +232,4 @@ def linear(function: Function, q: Array, v: Array, t: float = 0.0) -> tuple[Arra
 
 def at_state(q: Array, v: Array, t: float = 0.0) -> Points:
     """One instant of a state."""
-    return Points(np.asarray(q)[None], np.asarray(v)[None], np.array([t]))
+    return _new_points(np.asarray(q)[None], np.asarray(v)[None], np.array([t]))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import casadi
@@ -13,6 +13,7 @@ from hovi.dynamics.extension import SymbolicModel, archive
 from hovi.errors import ModelError, nearest
 from hovi.robot.mimic_model import CoordinateMap, uncoupled
 from hovi.robot.model import frame_ids
+from hovi.robot.robot import Robot
 from hovi.system.dataclass import dataclass
 
 _OutputMap = Callable[[casadi.SX, casadi.SX], list[casadi.SX]]
@@ -74,8 +75,17 @@ class RigidBodyFunctions:
             raise ModelError(
                 f"the robot has no frame {frame_name!r}: {nearest(frame_name, self.frames)}"
             )
-        index = self.frames[frame_name]
-        return self._reduced(casadi.Function.deserialize(self._model.frame_placement(index)))
+        known = self._placements
+        if frame_name not in known:
+            whole = casadi.Function.deserialize(
+                self._model.frame_placement(self.frames[frame_name])
+            )
+            known[frame_name] = self._reduced(whole)
+        return known[frame_name]
+
+    @cached_property
+    def _placements(self) -> dict[str, casadi.Function]:
+        return {}
 
     def _reduced(
         self, whole: casadi.Function, output_map: _OutputMap | None = None
@@ -105,6 +115,12 @@ class RigidBodyFunctions:
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickled as the archive; the functions are built again when used."""
         return type(self), (self.text, self.frames, self.coordinate_map)
+
+
+@lru_cache(maxsize=16)
+def functions_of(robot: Robot) -> RigidBodyFunctions:
+    """The dynamics of a robot as CasADi functions, which are built once."""
+    return casadi_functions(robot.model)
 
 
 def casadi_functions(model: pin.Model) -> RigidBodyFunctions:

@@ -18,7 +18,7 @@ from hovi.checks.shapes import numbers_of
 from hovi.checks.units import angle, length
 from hovi.conditions.condition import Condition, require_part
 from hovi.conditions.sets import Between, Equal
-from hovi.dynamics.symbolic_dynamics import casadi_functions
+from hovi.dynamics.symbolic_dynamics import functions_of
 from hovi.errors import InputError
 from hovi.robot.robot import Robot
 from hovi.system.dataclass import dataclass
@@ -169,7 +169,7 @@ class KeepFrame(Keep):
 
 def placement(robot: Robot, frame: str) -> Placement:
     """q -> R (3, 3), p (3,) of a frame."""
-    return cast(Placement, casadi_functions(robot.model).frame_placement(frame))
+    return cast(Placement, functions_of(robot).frame_placement(frame))
 
 
 Room = float | str | None

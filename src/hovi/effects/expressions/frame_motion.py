@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import casadi as ca
 
-from hovi.dynamics.symbolic_dynamics import casadi_functions
+from hovi.dynamics.symbolic_dynamics import functions_of
 from hovi.effects.expressions.symbols import SceneSymbols
 from hovi.errors import SceneError, nearest
 from hovi.robot.space.configuration_rate import configuration_rate
@@ -52,7 +52,7 @@ def frame_motion(robot: Robot, symbols: SceneSymbols, frame: str) -> FrameMotion
     frame: one of robot.frame_names.
     """
     q, t, base = symbols.q, symbols.t, symbols.base
-    R, p = casadi_functions(robot.model).frame_placement(frame)(q)
+    R, p = functions_of(robot).frame_placement(frame)(q)
     rate = configuration_rate(robot.model, q, symbols.v)
     if base is None:
         return FrameMotion(symbols, rate, R, p, ca.jtimes(p, q, rate))

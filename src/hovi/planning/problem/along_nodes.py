@@ -108,6 +108,13 @@ def equations_at_nodes(
     them. others: equations that are asked at nodes already. sizes: see `sizes_of`.
     """
     found, reason, step = list[Equation](), "", grid.duration / grid.intervals
+    rows = {
+        node: _rows_of([x for x in others if x.where.node == node], given[node], step)
+        for node in given
+    }
+    met = {
+        node: _is_met([x for x in others if x.where.node == node], given[node]) for node in given
+    }
     known = zip(along, sizes, strict=True)
     for part in (part for each, size in known for part in _parts(each, size, step)):
         for node, time in _nodes_of(part.given, grid):
@@ -115,12 +122,14 @@ def equations_at_nodes(
             if state is None:
                 found.append(part.at(where))
                 continue
-            asked = [x for x in others if x.where.node == node]
-            before = [*asked, *(x for x in found if x.where.node == node)]
-            kept = _independent(part.at(where), before, state, step)
+            before, own = rows[node], _rows_of([part.at(where)], state, step)
+            every = np.concatenate([before, own])
+            chosen = independent_rows(every, state.free.ravel())
+            kept = chosen[chosen >= len(before)] - len(before)
+            rows[node] = np.concatenate([before, own[kept]])
             if len(kept) > 0:
                 found.append(part.some(kept).at(where))
-            if state.name and all(np.abs(_missed(x, state)).max() <= TOLERANCE for x in asked):
+            if met[node]:
                 left = np.setdiff1d(part.rows.rows, kept)
                 reason = reason or part.some(left).violated(where, state)
     return found, reason
@@ -204,14 +213,18 @@ def _missed(each: Equation, state: NodeState) -> Array:
     return each.on.missed(each.y.values(at_state(state.q, state.v, each.where.time))[0])
 
 
-def _independent(
-    every: Equation, before: Sequence[Equation], state: NodeState, step: float
-) -> Index:
-    """The rows whose gradients in what is free are no combinations of those before."""
-    rows = np.concatenate([linear_at(each, state.q, state.v)[1] for each in (*before, every)])
-    columns = (rows / np.array([[1.0], [step]])).reshape(len(rows), -1)
-    chosen, first = independent_rows(columns, state.free.ravel()), len(rows) - every.y.size
-    return chosen[chosen >= first] - first
+def _rows_of(equations: Sequence[Equation], state: NodeState, step: float) -> Array:
+    """Their gradients in (q, step v) at a state, (E, 2 nv)."""
+    size = 2 * state.free.shape[1]
+    slopes = (linear_at(each, state.q, state.v)[1] for each in equations)
+    scaled = [(J / np.array([[1.0], [step]])).reshape(-1, size) for J in slopes]
+    return np.concatenate([np.zeros((0, size)), *scaled])
+
+
+def _is_met(equations: Sequence[Equation], state: NodeState) -> bool:
+    """Whether a node is known, and what is asked there already is met."""
+    near = (np.abs(_missed(each, state)).max() <= TOLERANCE for each in equations)
+    return bool(state.name) and all(near)
 
 
 def independent_rows(rows: Array, free: Mask) -> Index:

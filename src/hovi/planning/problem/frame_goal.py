@@ -20,7 +20,7 @@ from hovi.checks.shapes import numbers_of
 from hovi.conditions.frame_rows import axis_rows, rotation_rows
 from hovi.conditions.function import Curvature, Function, Points, Slopes
 from hovi.dynamics.point_function import PointFunction
-from hovi.dynamics.symbolic_dynamics import casadi_functions
+from hovi.dynamics.symbolic_dynamics import functions_of
 from hovi.errors import InputError, nearest, warn
 from hovi.robot.robot import Robot
 from hovi.robot.space.orientation import ORIENTATIONS, rotation_from
@@ -241,7 +241,7 @@ class PoseDifference(Function):
 
     @cached_property
     def _placement(self) -> ca.Function:
-        return casadi_functions(self.robot.model).frame_placement(self.goal.frame)
+        return functions_of(self.robot).frame_placement(self.goal.frame)
 
     @cached_property
     def _symbols(self) -> tuple[Symbols, ca.SX]:

@@ -28,8 +28,8 @@ STEPS, NEWTON_STEPS = 40, 12
 """Steps of the way, and largest number of Newton steps for each."""
 LARGEST_STEP = 0.3
 """Largest change of a joint in one Newton step, in [rad] or [m]."""
-REACHED = 1e-8
-"""Largest residual at which a step of the way is made, in [m] or [rad]."""
+REACHED, NEARBY = 1e-8, 1e-3
+"""Largest residuals at which the last step of the way is made, and the others, in [m] or [rad]."""
 RANK = 1e-6
 """Singular values that count as zero, relative to the largest."""
 
@@ -51,15 +51,19 @@ def goal_along(
     wanted = [each for each in kept if each.where == Along(0)]
     rows = [(each.y, np.asarray(each.on.value)) for each in wanted]
     rows.append((goal.difference(robot), np.zeros(())))
-    begun, _ = _missed(rows, robot, q, 0.0)
+    timed = any("t" in each.y.needs for each in wanted)
+    begun, J = _missed(rows, robot, q, 0.0)
+    missed = begun
     for s in np.linspace(0.0, 1.0, STEPS + 1)[1:]:
-        for _ in range(NEWTON_STEPS):
+        if timed:
             missed, J = _missed(rows, robot, q, s * duration)
+        for _ in range(NEWTON_STEPS):
             residual = missed - (1.0 - s) * begun
-            if np.abs(residual).max() <= REACHED:
+            if np.abs(residual).max() <= (NEARBY if s < 1.0 else REACHED):
                 break
             step = np.linalg.lstsq(J, -residual, rcond=RANK)[0]
             q = robot.integrate(q, np.clip(step, -LARGEST_STEP, LARGEST_STEP))
+            missed, J = _missed(rows, robot, q, s * duration)
         else:
             return None
     inside = robot.space.coordinates(q)
