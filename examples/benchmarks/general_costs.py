@@ -1,9 +1,9 @@
 """Twelve costs C(q, v, a, tau, t): hovi against CasADi and Ipopt on the same discrete problem.
 
 The formulas are those of the scene; hovi carries their derivatives through the analytic ones of the
-torques, Ipopt's are CasADi's of the whole expression, RNEA included. CasADi's interpreter evaluates
-both; with the argument `compiled`, code of gcc does. Both start from the cubic guess; since a cost
-may have several minima, Ipopt starts at hovi's motion once more and must stay.
+torques, Ipopt's are CasADi's of the whole expression, RNEA included, evaluated by CasADi's
+interpreter or, with the argument `compiled`, by code of gcc. Both start from the cubic guess;
+since a cost may have several minima, Ipopt starts at hovi's motion once more and must stay.
 
 Times are those of the processor, which depend little on other load: one thread does all the work.
 """
@@ -118,7 +118,7 @@ def measure(arm: str, cost: str, compiled: bool) -> dict[str, float]:
     """Steps and times of warm solves, and differences of the costs."""
     source, start, goal = ARMS[arm]
     robot = hovi.load_robot(source)
-    problem = _problem(robot, COSTS[cost](robot), start, goal, compiled)
+    problem = _problem(robot, COSTS[cost](robot), start, goal)
     ours = solve_on_grid(problem)
     assert ours.success, ours.message
     row = {"steps": ours.nit, "seconds": _seconds(lambda: solve_on_grid(problem), 3)}
@@ -147,9 +147,9 @@ def _seconds(work: Callable[[], object], runs: int) -> float:
 
 
 def _problem(
-    robot: hovi.Robot, effects: list[Effect], start: list[float], goal: list[float], compile: bool
+    robot: hovi.Robot, effects: list[Effect], start: list[float], goal: list[float]
 ) -> hovi.TrajectoryProblem:
-    scene = hovi.Scene(robot, [hovi.effects.Gravity(), *effects], compile=compile)
+    scene = hovi.Scene(robot, [hovi.effects.Gravity(), *effects])
     grid = hovi.Grid.uniform(1.0, INTERVALS, hovi.schemes.by_name(SCHEME))
     ld = hovi.DiscreteLagrangian(scene.effort_lagrangian(), grid)
     return hovi.TrajectoryProblem(ld, hovi.State(start), hovi.State(goal))

@@ -10,9 +10,10 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from hovi.dynamics.point_function import CHUNK, PointFunction
+from hovi.dynamics.point_function import PointFunction
 
 Array = npt.NDArray[np.float64]
+MANY = 1024
 
 
 def sparse_function() -> ca.Function:
@@ -31,7 +32,7 @@ def by_hand(x: Array, t: Array) -> tuple[Array, Array, Array]:
     return number, column, matrix
 
 
-@pytest.mark.parametrize("points", [0, 1, 2, 7, CHUNK, CHUNK + 1, 2 * CHUNK + 5])
+@pytest.mark.parametrize("points", [0, 1, 2, 7, MANY, MANY + 1, 2 * MANY + 5])
 def test_batches_of_any_size_equal_single_evaluations(points: int) -> None:
     random = np.random.default_rng(points)
     x, t = random.normal(size=(points, 2)), random.normal(size=(points, 1))
@@ -79,7 +80,7 @@ def heavy_function() -> ca.Function:
     return ca.Function("heavy", [x], [y, ca.dot(x, y)])
 
 
-@pytest.mark.parametrize("points", [5, 64, 101, CHUNK + 7])
+@pytest.mark.parametrize("points", [5, 64, 101, MANY + 7])
 def test_results_are_bitwise_independent_of_the_number_of_threads(
     points: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -91,39 +92,45 @@ def test_results_are_bitwise_independent_of_the_number_of_threads(
     assert results[0] == results[1] == results[2]
 
 
-def test_small_batches_use_one_thread(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("OMP_NUM_THREADS", "2")
-    used = {
-        (name, points): max(threads for _, threads in PointFunction(function)._parts(points))
-        for name, function in (("light", sparse_function()), ("heavy", heavy_function()))
-        for points in (2, 500)
-    }
-    heavy = {("heavy", 2): 1, ("heavy", 500): 2}
-    assert used == {("light", 2): 1, ("light", 500): 1, **heavy}
+X, S = ca.SX.sym("x"), ca.SX.sym("s")
+OPERATIONS: dict[str, ca.SX] = {
+    "arithmetic": (X + S) * (X - S) / (2.0 + X) - 1.0 / S + -X,
+    "roots and powers": ca.sqrt(S) + S**X + X**3 + X**2 + 2 * X,
+    "turns": ca.sin(X) + ca.cos(S) + ca.tan(X) + ca.atan2(X, S) + ca.asin(X / 9) + ca.acos(X / 9),
+    "exponentials": ca.exp(X) * ca.log(S) + ca.log1p(S) + ca.expm1(X) + ca.erf(X),
+    "hyperbolic": ca.sinh(X) + ca.cosh(X) + ca.tanh(X) + ca.asinh(X) + ca.acosh(1 + S),
+    "branches": ca.if_else(X > S, X, S) + ca.fmin(X, 0) + ca.fmax(X, S) + ca.fabs(X) + ca.sign(X),
+    "steps": ca.floor(X) + ca.ceil(S) + ca.fmod(X, S) + ca.copysign(S, X) + ca.remainder(X, S),
+    "truths": ca.logic_and(X > 0, S > 1) + ca.logic_or(X > 0, S > 1) + ca.logic_not(X) + (X == S),
+}
 
 
-@pytest.mark.parametrize("points", [0, 1, 5, 500, 2 * CHUNK + 1])
-def test_the_parts_of_a_batch_cover_it_once(points: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("OMP_NUM_THREADS", "3")
-    parts = list(PointFunction(heavy_function())._parts(points))
-    covered = [i for part, _ in parts for i in range(part.start, part.stop)]
-    assert covered == list(range(points))
-    assert all((part.stop - part.start) % threads == 0 for part, threads in parts)
-    assert all(part.stop - part.start <= CHUNK for part, _ in parts)
+@pytest.mark.parametrize("name", OPERATIONS)
+@pytest.mark.parametrize("points", [1, 15, 16, 17, 40])
+def test_results_are_the_bits_of_casadi(name: str, points: int) -> None:
+    function = ca.Function("f", [X, S], [OPERATIONS[name], ca.gradient(OPERATIONS[name], X)])
+    random = np.random.default_rng(points)
+    x, s = random.normal(size=(points, 1)), random.uniform(0.1, 2.0, (points, 1))
+    found = PointFunction(function)(x, s)
+    for i, (one, other) in enumerate(zip(x[:, 0], s[:, 0], strict=True)):
+        for mine, theirs in zip(found, function(one, other), strict=True):
+            assert mine[i].tobytes() == np.array(theirs)[0].tobytes()
 
 
-@pytest.mark.parametrize("points", [1, 2, 5, 7])
-def test_no_more_threads_than_points_share_the_heaviest_function(
-    points: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """A humanoid without analytic derivatives is heavy enough for several threads at one point."""
-    monkeypatch.setenv("OMP_NUM_THREADS", "4")
-    monkeypatch.setattr("hovi.dynamics.point_function.MIN_INSTRUCTIONS", 100)
-    function = PointFunction(heavy_function())
-    parts = list(function._parts(points))
-    assert max(threads for _, threads in parts) == min(4, points)
-    assert all(part.stop > part.start for part, _ in parts)
-    assert function(np.zeros((points, 3)))[0].shape == (points, 3)
+def test_numbers_that_are_none_are_passed_on() -> None:
+    x = np.array([[np.nan], [np.inf], [-np.inf], [0.0], [-0.0], [1.0]])
+    found = PointFunction(ca.Function("f", [X], [1.0 / X, ca.sqrt(X)]))(x)
+    with np.errstate(all="ignore"):
+        np.testing.assert_array_equal(found[0], 1.0 / x[:, 0])
+        np.testing.assert_array_equal(found[1], np.sqrt(x[:, 0]))
+
+
+def test_a_function_that_calls_another_is_evaluated_too() -> None:
+    inner = ca.Function("inner", [X], [ca.sin(X)], {"never_inline": True})
+    function = PointFunction(ca.Function("outer", [X], [2.0 * inner(X)]))
+    x = np.linspace(-1.0, 1.0, 5)[:, None]
+    np.testing.assert_allclose(function(x)[0], 2.0 * np.sin(x[:, 0]), rtol=1e-15)
+    assert function(x[:0])[0].shape == (0,)
 
 
 def test_concurrent_calls_are_independent() -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import subprocess
 import tempfile
 from collections import Counter
 from collections.abc import Callable
@@ -11,7 +10,6 @@ from pathlib import Path
 from random import Random
 from typing import Any
 
-import casadi as ca
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -23,7 +21,6 @@ from hard.verdict import Verdict
 from hovi import plan
 from hovi.discrete.grid import Grid
 from hovi.discrete.trajectory import Trajectory
-from hovi.dynamics.function_cache import compiled, library_folder
 from hovi.effects import Gravity
 from hovi.scene.scene import Scene
 from hovi.schemes import galerkin
@@ -223,43 +220,6 @@ def unopened_pickle() -> Outcome:
     return Outcome("executes the code" if ran else "refused, nothing is executed", not ran)
 
 
-MALICIOUS_CODE = (
-    '#include <stdio.h>\n__attribute__((constructor)) static void f(void) {{ fopen("{}", "w"); }}'
-)
-
-
-def malicious_library(folder: Path) -> Path:
-    """A library that creates the file folder/ran when loaded."""
-    source, library = folder / "malicious_library.c", folder / "malicious_library.so"
-    source.write_text(MALICIOUS_CODE.format(folder / "ran"))
-    subprocess.run(["cc", "-shared", "-fPIC", "-o", library, source], check=True)
-    return library
-
-
-def naive_library() -> str:
-    with tempfile.TemporaryDirectory() as name:
-        library = malicious_library(Path(name))
-        with contextlib.suppress(RuntimeError):  # it has no function f, but it has been loaded
-            ca.external("f", str(library))
-        return "executes its code" if (Path(name) / "ran").exists() else "executes nothing"
-
-
-def refused_library() -> Outcome:
-    with tempfile.TemporaryDirectory() as name, pytest.MonkeyPatch.context() as patch:
-        patch.setenv("XDG_CACHE_HOME", name)
-        x = ca.SX.sym("x")
-        function = ca.Function("square", [x], [x * x])
-        compiled(function)
-        (library,) = library_folder().glob("*.so")
-        library.write_bytes(malicious_library(Path(name)).read_bytes())
-        right = float(compiled(function)(3.0)) == 9.0
-        ran = (Path(name) / "ran").exists()
-        mode = library_folder().stat().st_mode & 0o777
-    executed = "its code is executed" if ran else "nothing is executed"
-    shown = f"built again, folder of mode {mode:o}, {executed}"
-    return Outcome(shown, right and not ran and mode == 0o700)
-
-
 def naive_inputs() -> str:
     h, q0, q1, v0 = 0.0, 0.0, float("nan"), 0.0
     with np.errstate(all="ignore"):
@@ -361,13 +321,6 @@ CASES = (
         "300 of 300",
     ),
     Case("29b", "a pickle is not executed", naive_pickle, unopened_pickle, "nothing is executed"),
-    Case(
-        "29c",
-        "a planted library is not loaded",
-        naive_library,
-        refused_library,
-        "nothing is executed, a folder of mode 700",
-    ),
     Case(
         "30a",
         "invalid times, grids and states are refused",

@@ -6,7 +6,6 @@ The waiting times below only tell an end from none; `examples/benchmarks/time_li
 from __future__ import annotations
 
 import json
-import os
 import subprocess
 import sys
 from pathlib import Path
@@ -99,17 +98,3 @@ def test_a_certificate_that_would_take_hours_gives_up_and_says_what_is_missing(
     assert found["certificate"]["replay"] is None
     assert found["certificate"]["missing"]["replay"] == "the time limit was reached"
     assert found["certificate"]["errors"] is not None
-
-
-def test_a_compiler_that_does_not_end_is_ended(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    compiler = tmp_path / "bin" / "cc"
-    compiler.parent.mkdir()
-    compiler.write_text('#!/bin/sh\ncase "$1" in -O*) sleep 600;; esac\n')
-    compiler.chmod(0o755)
-    monkeypatch.setenv("PATH", f"{compiler.parent}:{os.environ['PATH']}")
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    scene = UR5.format(keys="", intervals=16) + "[effects.viscous_friction]\ncoefficient = 0.1\n"
-    found = planned(scene, tmp_path, "--compile", "--time-limit", "3")
-    assert found["status"] == "time_limit"

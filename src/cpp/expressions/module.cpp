@@ -1,5 +1,5 @@
 // The Python binding: CasADi functions of SX expressions, evaluated at many points.
-#include <casadi/core/function.hpp>  // with calculus.hpp, which needs what it includes first
+#include <casadi/core/function.hpp>
 #include <nanobind/nanobind.h>
 
 #include <algorithm>
@@ -57,7 +57,7 @@ const casadi::Function& wrapped(nb::handle object) {
 // The instructions of a function, which are read once, and run at points of any number.
 class Expression {
  public:
-  // function: see is_expression.
+  // function: of SX expressions with dense arguments and results, which calls no others.
   explicit Expression(const casadi::Function& function) {
     for (casadi_int i = 0; i < function.n_in(); ++i)
       arguments_.push_back(static_cast<std::size_t>(function.numel_in(i)));

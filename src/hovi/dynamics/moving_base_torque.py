@@ -67,12 +67,11 @@ class MovingBaseTorque:
     """A TorqueModel: the rows of the robot's joints in the kernel on a moving base.
 
     model: without the base's joints. base: its (x, y, z, yaw, pitch, roll) as expressions of t.
-    compile: whether the motion of the base is compiled: see PointFunction.
     """
 
-    def __init__(self, model: pin.Model, base: ca.SX, t: ca.SX, compile: bool = False) -> None:
+    def __init__(self, model: pin.Model, base: ca.SX, t: ca.SX) -> None:
         self.kernel = rnea_kernel(on_base_joints(model))
-        self._jet = PointFunction(ca.Function("base", [t], list(base_jet(base, t))), compile)
+        self._jet = PointFunction(ca.Function("base", [t], list(base_jet(base, t))))
         columns = np.arange(3 * (BASE_DOF + model.nv)).reshape(3, -1)[:, BASE_DOF:]
         self._columns = columns.ravel()
         self._threads = default_threads()

@@ -10,8 +10,6 @@ import functools
 import math
 import os
 import threading
-from collections.abc import Iterator
-from contextlib import suppress
 from typing import Any
 
 import casadi as ca
@@ -20,19 +18,9 @@ import numpy.typing as npt
 
 from hovi._native.expressions import expression_of
 from hovi.checks.shapes import numbers_of
-from hovi.dynamics.function_cache import compiled
 from hovi.errors import InputError
-from hovi.system.deadline import OutOfTimeError
 
 Array = npt.NDArray[np.float64]
-
-CHUNK = 1024
-"""Maximum number of points per mapped call, which bounds the memory."""
-MIN_INSTRUCTIONS = 100_000
-"""Minimum number of instructions per thread. Two threads break even at 50,000 each: starting and
-joining them takes up to 100 microseconds, an interpreted instruction 2 to 5 nanoseconds."""
-COMPILED_SPEEDUP = 10
-"""Assumed speedup of compiled code, for the number of threads; 4 to 25 were measured."""
 
 
 class PointFunction:
@@ -42,21 +30,12 @@ class PointFunction:
     column as (P, r), a scalar as (P,). Many points are distributed over threads; results are
     bitwise independent of their number. Calls from several Python threads are safe.
 
-    function: of SX expressions.
-    compile: use compiled code, built or from the user's cache: see `compiled`. What is not built
-        at the deadline in force is interpreted.
+    function: of SX expressions. One that calls others is evaluated by CasADi, on one thread.
     """
 
-    def __init__(self, function: ca.Function, compile: bool = False) -> None:
-        self._arguments = function, compile
-        function = _dense(function)
-        self._cost = function.n_instructions()
-        if compile:
-            # at the deadline, the interpreter has the same results
-            with suppress(OutOfTimeError):
-                function = compiled(function)
-                self._cost //= COMPILED_SPEEDUP
-        self.function = function
+    def __init__(self, function: ca.Function) -> None:
+        self._given = function
+        self.function = function = _dense(function)
         self._expression = expression_of(function)
         self._widths = [int(function.numel_in(i)) for i in range(function.n_in())]
         self._shapes = [function.size_out(i) for i in range(function.n_out())]
@@ -67,8 +46,8 @@ class PointFunction:
         self._lock = threading.Lock()
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickled as its arguments; compiled code stays in the cache."""
-        return type(self), self._arguments
+        """Pickled as its function."""
+        return type(self), (self._given,)
 
     def __call__(self, *arguments: Array) -> list[Array]:
         """Evaluate at P points; arguments of shape (P, width). Raises InputError for others."""
@@ -80,9 +59,8 @@ class PointFunction:
             given = tuple(a.reshape(points, n) for a, n in zip(arrays, self._widths, strict=True))
             made = tuple(r.reshape(points, n) for r, n in zip(results, self._sizes, strict=True))
             self._expression(given, made, points, self._threads)
-            return [_squeeze(result) for result in results]
-        for part, threads in self._parts(points):
-            self._evaluate([a[part] for a in arrays], [r[part] for r in results], threads)
+        elif points > 0:
+            self._interpret(arrays, results, points)
         return [_squeeze(result) for result in results]
 
     def _check(self, arrays: list[Array], points: int) -> None:
@@ -100,23 +78,9 @@ class PointFunction:
                     f"{array.shape}."
                 )
 
-    def _parts(self, points: int) -> Iterator[tuple[slice, int]]:
-        """(points of a call, number of threads that share them equally); a remainder runs alone."""
-        for first in range(0, points, CHUNK):
-            last = min(first + CHUNK, points)
-            count = last - first
-            threads = max(1, min(self._threads, count, count * self._cost // MIN_INSTRUCTIONS))
-            shared = last - count % threads
-            yield slice(first, shared), threads
-            if shared < last:
-                yield slice(shared, last), 1
-
-    def _evaluate(self, arguments: list[Array], results: list[Array], threads: int) -> None:
-        points = len(arguments[0])
+    def _interpret(self, arguments: list[Array], results: list[Array], points: int) -> None:
         with self._lock:
-            mapped = (
-                self._mapped(points) if threads == 1 else self._mapped(points, "thread", threads)
-            )
+            mapped = self._mapped(points)
         buffer, trigger = mapped.buffer()
         # CasADi's stubs lack that buffers take a memoryview
         for i, argument in enumerate(arguments):

@@ -50,7 +50,6 @@ class TorqueModel(Protocol):
 class CasadiTorque:
     """A torque model from CasADi expressions: the reference, and the fallback of faster models.
 
-    compile: whether its functions are compiled: see PointFunction.
     space: the configuration space; None if it is a vector space.
     """
 
@@ -58,19 +57,18 @@ class CasadiTorque:
         self,
         symbols: Symbols,
         tau: ca.SX,
-        compile: bool = False,
         space: ConfigurationSpace | None = None,
     ) -> None:
         self.nv = int(tau.shape[0])
         self._symbols, self._tau = symbols, tau
-        self._space, self._compile = space, compile
-        self._torque = PointFunction(ca.Function("tau", list(symbols), [tau]), compile)
+        self._space = space
+        self._torque = PointFunction(ca.Function("tau", list(symbols), [tau]))
 
     @cached_property
     def _linearize(self) -> PointFunction:
         J = tangent.jacobian(self._tau, self._symbols, self._space)
         function = ca.Function("tau_J", list(self._symbols), [self._tau, J])
-        return PointFunction(function, self._compile)
+        return PointFunction(function)
 
     @cached_property
     def _curvature(self) -> PointFunction | None:
@@ -81,7 +79,7 @@ class CasadiTorque:
         if curvature.nnz() == 0:
             return None
         function = ca.Function("ddtau", [*self._symbols, weight], [curvature])
-        return PointFunction(function, self._compile)
+        return PointFunction(function)
 
     def __getstate__(self) -> dict[str, Any]:
         """The functions without the symbols, which cannot be pickled."""

@@ -40,7 +40,6 @@ class RunningCostTerm:
     evaluates the sum.
 
     symbols: (q, v, a, t). tau: another symbol, shape (nv,). expression: C, a scalar of them.
-    compile: whether its functions are compiled: see PointFunction.
     space: the configuration space; None if it is a vector space.
     """
 
@@ -49,7 +48,6 @@ class RunningCostTerm:
         symbols: Symbols,
         tau: ca.SX,
         expression: ca.SX,
-        compile: bool = False,
         space: ConfigurationSpace | None = None,
     ) -> None:
         q, v, a, t = symbols
@@ -65,9 +63,9 @@ class RunningCostTerm:
         )
         x, u = self.columns, slice(3 * n, 4 * n)
         parts = [gradient[x], gradient[u], hessian[u, u], hessian[u, x], hessian[x, x]]
-        self._value = PointFunction(ca.Function("C", arguments, [expression]), compile)
+        self._value = PointFunction(ca.Function("C", arguments, [expression]))
         expand = ca.Function("C_expand", arguments, [expression, *parts])
-        self._expand = PointFunction(expand, compile)
+        self._expand = PointFunction(expand)
 
     def value(self, *jet: Array, tau: Array, t: Array | None = None) -> Array:
         """C at P points, shape (P,)."""
@@ -113,7 +111,6 @@ class RunningCostTerm:
 class PotentialTerm:
     """A term V(q, v, a, t) of the cost from a CasADi expression.
 
-    compile: whether its functions are compiled: see PointFunction.
     space: the configuration space; None if it is a vector space.
     """
 
@@ -121,14 +118,13 @@ class PotentialTerm:
         self,
         symbols: Symbols,
         expression: ca.SX,
-        compile: bool = False,
         space: ConfigurationSpace | None = None,
     ) -> None:
         q, v, a, t = symbols
         hessian, gradient = tangent.hessian(expression, symbols, space)
         expand = ca.Function("V_expand", [q, v, a, t], [expression, gradient, hessian])
-        self._value = PointFunction(ca.Function("V", [q, v, a, t], [expression]), compile)
-        self._expand = PointFunction(expand, compile)
+        self._value = PointFunction(ca.Function("V", [q, v, a, t], [expression]))
+        self._expand = PointFunction(expand)
 
     def value(self, *jet: Array, t: Array | None = None) -> Array:
         """V at P points, shape (P,)."""

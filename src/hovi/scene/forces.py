@@ -94,7 +94,7 @@ def scene_force(scene: Scene, drive: Drive | None = None) -> Force:
     q, v, t = scene.terms.symbols.q, scene.terms.symbols.v, scene.terms.symbols.t
     slope = tangent.jacobian(resistance, (q, v, ca.SX(0, 1), t), scene.robot.curved_space)
     function = ca.Function("resistance", [q, v, t], [resistance, slope])
-    return Force(scene.robot.nv, drive, PointFunction(function, scene.compile))
+    return Force(scene.robot.nv, drive, PointFunction(function))
 
 
 def resistance_of(scene: Scene) -> ca.SX | None:

@@ -22,7 +22,7 @@ from hovi.dynamics.moving_base_torque import MovingBaseTorque, inverse_dynamics,
 from hovi.dynamics.torque_model import AnalyticTorque, CasadiTorque, SummedTorque, TorqueModel
 from hovi.effects.effect import Effect
 from hovi.effects.registration import REGISTRY, as_effects, effect_of_table
-from hovi.errors import ModelError, SceneError
+from hovi.errors import ModelError, SceneError, warn
 from hovi.robot.mass_matrix import check_mass_matrix, joints_without_inertia, named_joints
 from hovi.robot.meshes.stored_meshes import StoredMeshes
 from hovi.robot.mimic_model import PortableModel, check_coupling
@@ -38,6 +38,9 @@ from hovi.system.dataclass import dataclass
 Array = npt.NDArray[np.float64]
 
 
+WITHOUT_COMPILING = "`compile` has no effect any more: expressions are as fast without it."
+
+
 @check_arguments_except("effects", "passive", "package_dirs")
 @dataclass(frozen=True, eq=False)
 class Scene:
@@ -48,12 +51,10 @@ class Scene:
         {"gravity": {"acceleration": 9.81}}.
     passive: names of unactuated joints, with all their coordinates.
     begin: what the time t of the effects' formulas is at the start of a motion, in [s].
-    compile: compile CasADi functions once, to libraries in the user's cache folder. It needs a C
-        compiler, takes seconds and does not change results.
+    compile: without effect, and to be removed: expressions are evaluated as fast without.
     model: the scene's own copy of the robot's model, with gravity and armature set by effects and
         zero by default.
-    Raises SceneError if an effect is not valid for the robot, or given twice; with compile, its
-    functions raise CompilationError if they cannot be compiled or stored.
+    Raises SceneError if an effect is not valid for the robot, or given twice.
     """
 
     robot: Robot
@@ -67,6 +68,9 @@ class Scene:
         effects = as_effects(self.effects)
         if not np.isfinite(self.begin):
             raise SceneError(f"`begin` of a scene must be a finite time in [s], got {self.begin}.")
+        if self.compile:
+            warn(WITHOUT_COMPILING)
+            object.__setattr__(self, "compile", False)
         keys = [effect.key for effect in effects]
         for key in set(keys):
             if keys.count(key) > 1:
@@ -92,15 +96,15 @@ class Scene:
         if not self.analytic:
             tau = inverse_dynamics(self.model, base, *symbols.columns())
             total = tau if added is None else tau + added
-            return CasadiTorque(symbols.columns(), total, self.compile, space)
+            return CasadiTorque(symbols.columns(), total, space)
         main: TorqueModel
         if base is None:
             main = AnalyticTorque(rnea_kernel(self.model))
         else:
-            main = MovingBaseTorque(self.model, base, symbols.t, self.compile)
+            main = MovingBaseTorque(self.model, base, symbols.t)
         if added is None:
             return main
-        return SummedTorque(main, CasadiTorque(symbols.columns(), added, self.compile, space))
+        return SummedTorque(main, CasadiTorque(symbols.columns(), added, space))
 
     @cached_property
     def terms(self) -> SceneTerms:
@@ -189,13 +193,10 @@ class Scene:
         return dataclasses.replace(self, effects=kept)
 
     def from_time(self, time: float) -> Scene:
-        """The scene by a clock that starts at a time, in [s]: itself if no effect depends on it.
-
-        Its functions are not compiled, since each would be of that time alone.
-        """
+        """The scene by a clock that starts at a time, in [s]: itself if no effect depends on it."""
         if time == 0.0 or not self.terms.timed:
             return self
-        return dataclasses.replace(self, begin=self.begin + time, compile=False)
+        return dataclasses.replace(self, begin=self.begin + time)
 
     def graph(self) -> ca.Function:
         """(q, v, a, t) -> (tau, L~), as one expression graph, without a cost on the jerk."""
@@ -229,8 +230,6 @@ class Scene:
         lines.append("left out:")
         lines += [f"  {line}" for line in self._left_out()] or ["  nothing in the URDF"]
         lines.append(self._derivatives())
-        if self.compile:
-            lines.append("CasADi functions are compiled to machine code")
         return "\n".join([*lines, *self.account().lines()])
 
     def to_dict(self) -> dict[str, Any]:
@@ -286,15 +285,13 @@ class Scene:
     @cached_property
     def _potential(self) -> PotentialTerm | None:
         V, columns = self.terms.potential, self.terms.symbols.columns()
-        return (
-            None if V is None else PotentialTerm(columns, V, self.compile, self.robot.curved_space)
-        )
+        return None if V is None else PotentialTerm(columns, V, self.robot.curved_space)
 
     @cached_property
     def _running_cost(self) -> RunningCostTerm | None:
         tau, columns = ca.SX.sym("tau", self.robot.nv), self.terms.symbols.columns()
         C, space = self._cost_of(tau), self.robot.curved_space
-        return None if C is None else RunningCostTerm(columns, tau, C, self.compile, space)
+        return None if C is None else RunningCostTerm(columns, tau, C, space)
 
     def _cost_of(self, tau: ca.SX) -> ca.SX | None:
         """C(q, v, a, tau, t): what is left of a passive joint's torque has no cost."""
@@ -322,7 +319,7 @@ class Scene:
 
     def __getstate__(self) -> dict[str, Any]:
         """The fields without cached functions, which worker processes build themselves."""
-        names = ("robot", "effects", "passive", "begin", "compile", "model")
+        names = ("robot", "effects", "passive", "begin", "model")
         state = {name: getattr(self, name) for name in names}
         return {**state, "model": PortableModel.of(self.model)}
 

@@ -77,7 +77,7 @@ def plan(
     ] = True,
     compile: Annotated[
         bool,
-        typer.Option("--compile", help="Compile the CasADi functions; cached."),
+        typer.Option("--compile", help="Without effect, and to be removed.", hidden=True),
     ] = False,
     tolerance: Annotated[
         str | None,

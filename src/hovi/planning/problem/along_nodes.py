@@ -108,13 +108,9 @@ def equations_at_nodes(
     them. others: equations that are asked at nodes already. sizes: see `sizes_of`.
     """
     found, reason, step = list[Equation](), "", grid.duration / grid.intervals
-    rows = {
-        node: _rows_of([x for x in others if x.where.node == node], given[node], step)
-        for node in given
-    }
-    met = {
-        node: _is_met([x for x in others if x.where.node == node], given[node]) for node in given
-    }
+    asked = {node: [each for each in others if each.where.node == node] for node in given}
+    rows = {node: _rows_of(asked[node], state, step) for node, state in given.items()}
+    satisfied = {node: _holds(asked[node], state) for node, state in given.items()}
     known = zip(along, sizes, strict=True)
     for part in (part for each, size in known for part in _parts(each, size, step)):
         for node, time in _nodes_of(part.given, grid):
@@ -129,7 +125,7 @@ def equations_at_nodes(
             rows[node] = np.concatenate([before, own[kept]])
             if len(kept) > 0:
                 found.append(part.some(kept).at(where))
-            if met[node]:
+            if satisfied[node]:
                 left = np.setdiff1d(part.rows.rows, kept)
                 reason = reason or part.some(left).violated(where, state)
     return found, reason
@@ -221,8 +217,8 @@ def _rows_of(equations: Sequence[Equation], state: NodeState, step: float) -> Ar
     return np.concatenate([np.zeros((0, size)), *scaled])
 
 
-def _is_met(equations: Sequence[Equation], state: NodeState) -> bool:
-    """Whether a node is known, and what is asked there already is met."""
+def _holds(equations: Sequence[Equation], state: NodeState) -> bool:
+    """Whether a node is known, and what is asked there already holds."""
     near = (np.abs(_missed(each, state)).max() <= TOLERANCE for each in equations)
     return bool(state.name) and all(near)
 
