@@ -151,7 +151,7 @@ class BoundedAction(BoundedObjective[DiscretePath]):
     def _model(
         self, x: DiscretePath, sigma: Array, rho: Array, multipliers: Array
     ) -> QuadraticModel:
-        points = (self._of_points(part) for part in (sigma, rho, multipliers))
+        points = (self.at_points(part) for part in (sigma, rho, multipliers))
         sigma_at, rho_at, multipliers_at = points
         gradient = self._unscaled(rho_at, 1)
         weight = self._unscaled(sigma_at, 2)
@@ -197,7 +197,7 @@ class BoundedAction(BoundedObjective[DiscretePath]):
 
         multipliers: of the outputs, shape (R,).
         """
-        at_points = self._of_points(multipliers)
+        at_points = self.at_points(multipliers)
         force = self._unscaled(at_points, 1)
         k = self._jet_size
         zero = np.zeros_like(force)
@@ -312,7 +312,7 @@ class BoundedAction(BoundedObjective[DiscretePath]):
 
     def pull(self, forces: Array, model: QuadraticModel) -> Array:
         """Gradient of sum of weights (forces y) in the unknowns."""
-        at_points, expansion = self._of_points(forces), self.action.expansion
+        at_points, expansion = self.at_points(forces), self.action.expansion
         local = np.zeros_like(model.intervals.gradient)
         for i, (batch, part, (_, J)) in enumerate(self._batches):
             here = np.ascontiguousarray(at_points[part])
@@ -444,8 +444,8 @@ class BoundedAction(BoundedObjective[DiscretePath]):
         first = self._point_count
         return slice(first, first + (0 if self.rows is None else self.rows.size))
 
-    def _of_points(self, values: Array) -> Array:
-        """The values of the outputs at the points, (P, K)."""
+    def at_points(self, values: Array) -> Array:
+        """Of values of all outputs, (R,), those at the points, (P, K)."""
         return values[: self._point_count].reshape(self._points, -1)
 
     @property

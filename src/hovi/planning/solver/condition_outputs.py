@@ -68,6 +68,14 @@ class ConditionOutputs:
         found = zip(self.given, self._scales, strict=True)
         return np.concatenate([each.y.values(at) / scale for each, scale in found], axis=1)
 
+    def by_name(self, slopes: Array) -> dict[str, Array]:
+        """Derivatives in the values, (..., K), as those in y, by the names of conditions."""
+        found, first = dict[str, Array](), 0
+        for each, scale in zip(self.given, self._scales, strict=True):
+            found[each.name] = slopes[..., first : first + each.y.size] / scale
+            first += each.y.size
+        return found
+
     def excess(self, trajectory: Trajectory, tolerance: float) -> Array:
         """The excess over lower and upper bounds in every interval, (2, N, K); -inf for none.
 

@@ -6,12 +6,16 @@ import dataclasses
 import pickle
 from typing import Any
 
+import casadi as ca
 import numpy as np
 import numpy.typing as npt
 import pytest
 
 import hovi
 from hovi.errors import InputError
+from hovi.optimize.criteria import Criteria
+from hovi.optimize.interior_point import minimize_bounded
+from hovi.optimize.start import Start
 from hovi.planning.problem.limits import as_limits
 from oracles.on_grid import solve_on_grid
 from samples.floating_arm import BALL, flight, floating
@@ -157,6 +161,43 @@ def test_a_slider_at_its_largest_speed_follows_by_the_time_there() -> None:
     assert factor.cost_slopes("goal")[0, 0] == pytest.approx(8 * m**2 * V / (9 * s**2), rel=1e-4)
     assert factor.cost_curvature("goal")[0, 0] == pytest.approx(16 * m**2 / (9 * s**3), rel=1e-2)
     assert factor.strictness < 1e-5
+
+
+def test_a_bound_of_a_condition_moves_the_cost_by_its_multipliers() -> None:
+    """The slider again: dJ/dV = 8 m^2 / 9 (2 V / s - L / s^2)."""
+    m, T, L, V = 0.5, 2.0, 1.0, 0.7
+    rail, s = arm("rail", ("prismatic",)), T - L / V
+    fast = hovi.Condition(lambda v: v, hovi.Between(-2.0, V), name="fast")
+    asked = problem(rail, [0.0], [L], T, intervals=80, conditions=(fast,))
+    slopes = solve_on_grid(asked).factor.bound_slopes["fast"]
+    expected = 8 * m**2 / 9 * (2 * V / s - L / s**2)
+    np.testing.assert_allclose(slopes, [[0.0], [expected]], rtol=1e-3, atol=1e-9)
+
+
+def test_bound_slopes_are_differences_of_costs_on_the_same_rows() -> None:
+    """In the unit of y, of both sides and of several values, whatever their scales."""
+    robot, low, high = hovi.load_robot(hovi.example("two_link.urdf")), -1.3, 2.2
+    ranges = np.array([9.0 - low, high + 9.0])
+    both = hovi.Between([low, -9.0], [9.0, high])
+    asked = hovi.Condition(lambda q, v: ca.vertcat(q[0], v[0]), both, name="both")
+    found: Any = solve_on_grid(problem(robot, [-1.2, 0.4], [0.9, 0.4], 1.5, conditions=(asked,)))
+    slopes = found.factor.bound_slopes["both"]
+    path, solved = found.solved_bounds.sharpened(found.trajectory.path)
+
+    def cost(side: str, entry: int, by: float) -> float:
+        objective, bounds = solved.objective.with_fixed_rows(), solved.objective.bounds
+        moved = getattr(bounds, side).reshape(-1, 2) + by / ranges * np.eye(2)[entry]
+        objective.bounds = dataclasses.replace(bounds, **{side: moved.ravel()})
+        criteria = Criteria(barrier=1e-12, max_iterations=200)
+        ended = minimize_bounded(objective, Start(path), criteria)
+        assert ended.why == "stationary"
+        return float(ended.value)
+
+    for i, side in enumerate(("lower", "upper")):
+        difference = (cost(side, i, 1e-4) - cost(side, i, -1e-4)) / 2e-4
+        assert abs(difference) > 1.0
+        assert slopes[i, i] == pytest.approx(difference, rel=1e-5)
+        assert abs(slopes[i, 1 - i]) < 1e-7
 
 
 def test_without_freedom_in_a_joint_its_slopes_are_no_numbers() -> None:

@@ -14,6 +14,7 @@ the other; at a limit that holds for a while, such touches are next to where it 
 
 from __future__ import annotations
 
+from dataclasses import field
 from functools import cached_property
 from typing import Literal, Self
 
@@ -86,6 +87,8 @@ class SolutionFactor:
     strictness: the least, over all bounds, of the larger one of the multiplier, relative to the
         mean density of the cost, and the gap, relative to the range; infinite without bounds, and
         small at limits that hold for a while, where one row after the other begins to act.
+    bound_slopes: d cost / d(lower, upper) of the bounds of every condition, by its name, of shape
+        (2, size of y), in the unit of y: with multipliers z >= 0 of y, the sums of w z and of -w z.
     """
 
     problem: TrajectoryProblem
@@ -93,6 +96,7 @@ class SolutionFactor:
     system: KktModel
     active: int
     strictness: float
+    bound_slopes: dict[str, Array] = field(default_factory=dict)
 
     @classmethod
     def of(
@@ -126,7 +130,8 @@ class SolutionFactor:
         active, strictness = _active(barrier, outputs.density(objective.bounds.measure))
         rows = _rows_of(objective, model, np.flatnonzero(active))
         system = objective.action.kkt(path, model, rows)
-        found = cls(problem, path, system, int(active.sum()), strictness)
+        bounds = _bound_slopes(objective, barrier)
+        found = cls(problem, path, system, int(active.sum()), strictness, bounds)
         found._require_stationary(abs(outputs.value))
         return found
 
@@ -241,6 +246,18 @@ def _exact_model(objective: BoundedAction, path: DiscretePath, multipliers: Arra
     if not isinstance(plain, BandModel):
         raise InputError("the factor needs a grid of at most 1,000 intervals; use fewer.")
     return plain
+
+
+def _bound_slopes(objective: BoundedAction, barrier: Barrier) -> dict[str, Array]:
+    """See SolutionFactor."""
+    if objective.more is None:
+        return {}
+    weights = objective.bounds.weights
+    lower, upper = (
+        objective.at_points(weights * z)[:, len(objective.columns) :].sum(axis=0)
+        for z in (barrier.zl, -barrier.zu)
+    )
+    return objective.more.by_name(np.stack([lower, upper]))
 
 
 def _active(barrier: Barrier, density: float) -> tuple[npt.NDArray[np.bool_], float]:
