@@ -42,11 +42,16 @@ def info(
         bool,
         typer.Option("--check", help="List what will hurt instead, with the lines to write."),
     ] = False,
+    kept: Annotated[
+        bool,
+        typer.Option("--kept", help="Plan a scene without each condition that it keeps instead."),
+    ] = False,
     json: JsonObject = False,
 ) -> None:
     """Describe a robot, a scene and the effects that it leaves out, or a motion.
 
-    With --check the exit code is 1 if something stops a plan, and 0 otherwise.
+    With --check the exit code is 1 if something stops a plan, and 0 otherwise. With --kept a table
+    says what each table [[keep]] of a scene costs in effort, steps and time.
     """
     from hovi.errors import InputError, nearest
     from hovi.robot.bundled_models import example_scenes
@@ -59,7 +64,11 @@ def info(
         raise InputError("--json is for --check: hovi info ROBOT --check --json.")
     if check and (what is None or what.lower().endswith(".npz")):
         raise InputError("what will hurt is asked of a robot: give its file or name, or a scene.")
-    if what is None:
+    if kept and (what is None or not (what.lower().endswith(".toml") or what in scenes)):
+        raise InputError("what is kept is asked of a scene: hovi info SCENE.toml --kept.")
+    if kept:
+        _kept(str(what))
+    elif what is None:
         print(_listed("robots of example-robot-data", robots))
         print(_listed("scenes that ship with hovi", scenes))
     elif what.lower().endswith(".toml") or what in scenes:
@@ -94,6 +103,19 @@ def _scene(scene: str, check: bool, json: bool) -> None:
     if check:
         _examine(task.scene.robot, json, task.scene.model)
     print(describe_task(task))
+
+
+def _kept(scene: str) -> None:
+    from hovi.accuracy.kept_study import COLUMNS, kept_rows, kept_study
+    from hovi.cli.arguments.files import find_scene
+    from hovi.cli.reports.terminal_table import print_table
+    from hovi.planning.task_file.reading import load_task
+    from hovi.system.progress import progress
+
+    with progress(quiet=False, doing="reading the scene") as report:
+        task = load_task(find_scene(scene))
+        trials = kept_study(task, report)
+    print_table(COLUMNS, kept_rows(trials), task.name, [0, 5])
 
 
 def _examine(robot: Robot, json: bool, model: pin.Model | None = None) -> NoReturn:
