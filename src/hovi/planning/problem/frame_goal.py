@@ -199,6 +199,10 @@ class PoseDifference(Function):
     goal: FrameGoal
     robot: Robot
 
+    def __getstate__(self) -> dict[str, Any]:
+        """The state without what is cached, which is computed anew where it was sent to."""
+        return {"goal": self.goal, "robot": self.robot}
+
     @property
     def needs(self) -> frozenset[str]:
         """The configuration alone."""

@@ -39,6 +39,7 @@ from hovi.planning.search.least_duration import least_duration
 from hovi.planning.search.option_fields import spell_out
 from hovi.planning.search.options import PlanOptions
 from hovi.planning.search.search import Search
+from hovi.planning.solver.iterates import Cancel, OnIterate, watched
 from hovi.planning.solver.outcome.self_collision import self_collision_sentence
 from hovi.planning.solver.outcome.without_solve import infeasible_at_once, without_search
 from hovi.planning.solver.solver import Solution
@@ -68,6 +69,8 @@ class _Plan(Protocol[Keywords]):
         duration: Duration,
         progress: Progress | None = None,
         options: PlanOptions | None = None,
+        on_iterate: OnIterate | None = None,
+        cancel: Cancel | None = None,
         *_: Keywords.args,
         **changes: Keywords.kwargs,
     ) -> Solution:
@@ -100,6 +103,8 @@ def plan(
     duration: Duration,
     progress: Progress | None = None,
     options: PlanOptions | None = None,
+    on_iterate: OnIterate | None = None,
+    cancel: Cancel | None = None,
     **changes: Any,
 ) -> Solution:
     """The motion of least 1/2 integral |tau|^2 from a state to a goal.
@@ -117,9 +122,12 @@ def plan(
     progress: called with a line of text and the completed fraction, in [0, 1]; in a notebook, a
         line under the cell by default.
     options: a PlanOptions; the following keywords override it.
+    on_iterate: called with a hovi.Iterate after every step, whose `solution` is the motion so far.
+    cancel: a function without arguments, such as the `is_set` of a threading.Event: once it returns
+        True, the plan ends as by Ctrl-C, with the best motion so far.
     {options}
     Raises InputError, ModelError, SceneError or SchemeError for invalid input, UnreachableError for
-    a start that no configuration reaches.
+    a start that no configuration reaches, CancelledError if it is cancelled before it has a motion.
     """
     began = time.perf_counter()
     if not isinstance(scene, Scene):
@@ -138,9 +146,10 @@ def plan(
         given = start_end, goal_end
     length = as_duration(duration)
     planned = functools.partial(_planned, options.aiming(scene), *given, length, progress)
-    if options.objective == "time":
-        return least_duration(planned, length, options)
-    return planned(options, began)
+    with watched(on_iterate, cancel):
+        if options.objective == "time":
+            return least_duration(planned, length, options)
+        return planned(options, began)
 
 
 def _planned(
