@@ -11,7 +11,6 @@ import pytest
 
 import hovi
 from hovi.errors import CancelledError, InputError
-from hovi.planning.solver.iterates import Iterate
 from samples.asked_features import FEATURES, AskedFeatures, planned_with
 
 pytestmark = pytest.mark.filterwarnings("ignore::hovi.errors.HoviWarning")
@@ -61,7 +60,7 @@ GRAVITY = 9.8
 def test_iterates_are_motions_of_their_costs_that_approach_the_minimum(
     search: str, arm_scene: hovi.Scene
 ) -> None:
-    seen: list[Iterate] = []
+    seen: list[hovi.Iterate] = []
     found = searched(arm_scene, search, intervals=24, on_iterate=seen.append)
     price = found.problem.time_weight  # type: ignore[union-attr]
     assert found.success
@@ -82,7 +81,7 @@ def test_iterates_are_motions_of_their_costs_that_approach_the_minimum(
 @pytest.mark.parametrize("feature", FEATURES)
 def test_iterates_of_every_kind_of_problem_join_its_ends(feature: str) -> None:
     asked = AskedFeatures.of(feature)
-    seen: list[Iterate] = []
+    seen: list[hovi.Iterate] = []
 
     class Watched(AskedFeatures):
         @property
@@ -128,7 +127,7 @@ def test_another_thread_cancels_a_plan(arm_scene: hovi.Scene) -> None:
     found: list[hovi.Solution] = []
     steps = 0
 
-    def slow(iterate: Iterate) -> None:
+    def slow(iterate: hovi.Iterate) -> None:
         nonlocal steps
         steps += 1
         begun.set()
@@ -168,7 +167,7 @@ def test_errors_of_the_functions_leave_the_plan_as_they_are(
 ) -> None:
     """A solve ends as diverged after an arithmetic error of its own."""
 
-    def failing(*_: Iterate) -> bool:
+    def failing(*_: hovi.Iterate) -> bool:
         raise error("mine")
 
     functions: dict[str, Any] = {name: failing}
@@ -179,7 +178,7 @@ def test_errors_of_the_functions_leave_the_plan_as_they_are(
 def test_a_plan_that_a_watcher_makes_is_not_watched(arm_scene: hovi.Scene) -> None:
     numbers: list[int] = []
 
-    def planning(iterate: Iterate) -> None:
+    def planning(iterate: hovi.Iterate) -> None:
         numbers.append(iterate.number)
         if len(numbers) == 1:
             assert hovi.plan(arm_scene, HANG, REACH, 2.0, limits="none").success
