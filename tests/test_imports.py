@@ -162,7 +162,7 @@ energy = pinocchio.computePotentialEnergy(model, data, q)
 assert np.isfinite(energy) and found.success, found.message
 print(repr(found.cost))
 """
-"""Uses all three in one process: casadi and pinocchio of the process are those of hovi's modules."""
+"""Uses all three in one process, where hovi shares the types of the other two."""
 
 
 @pytest.mark.parametrize("order", ORDERS)
