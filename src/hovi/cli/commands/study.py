@@ -137,6 +137,18 @@ def show(
                 print(f"wrote    {path}")
 
 
+@app.command("state")
+def state(
+    folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="The folder of a study.")],
+    json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+) -> None:
+    """Print how far a study is, while it runs or after it ended; its folder is only read."""
+    from hovi.cli.reports.study import print_state
+    from hovi.study.showing.state import StudyState
+
+    print_state(StudyState.read(folder), json)
+
+
 @app.command("motion")
 def motion(
     folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="The folder of a study.")],
