@@ -26,9 +26,9 @@ from hovi.study.showing.charts import (
 )
 from hovi.study.showing.plans import Plans
 from hovi.study.showing.summary import summary
-from hovi.study.showing.worst_page import shared_pieces, write_worst
 from hovi.study.storage.folder import About, used_alone
 from hovi.study.study import Study
+from hovi.study.worst_page import shared_pieces, write_worst
 from hovi.viewing.replay_session import page_of
 
 pytest.importorskip("pyarrow")

@@ -113,7 +113,7 @@ def show(
     from hovi.study.showing.charts import draw_against, draw_histograms, draw_map
     from hovi.study.showing.plans import Plans
     from hovi.study.showing.summary import summary
-    from hovi.study.showing.worst_page import write_worst
+    from hovi.study.worst_page import write_worst
 
     for path in (histograms, picture):
         if path is not None:
