@@ -56,8 +56,8 @@ class Plans:
         taken = zip(runs["key"], runs["seconds"], strict=True)
         seconds = {k: s for k, s in taken if s is not None}
         about = About.read(folder)
-        names = () if about is None else about.coordinates
-        return cls(folder, table, parameters, seconds, coordinates=names)
+        known = () if about is None else about.coordinates
+        return cls(folder, table, parameters, seconds, coordinates=known)
 
     @classmethod
     def _so_far(cls, folder: Path, index: Index) -> Plans:
