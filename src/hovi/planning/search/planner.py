@@ -28,6 +28,7 @@ from hovi.planning.problem.notation.smoothing import smoothed
 from hovi.planning.problem.presolve.assumptions import assumptions
 from hovi.planning.problem.presolve.findings import findings
 from hovi.planning.problem.presolve.length_slips import grasped_slips
+from hovi.planning.refinement.error_estimate import with_metadata
 from hovi.planning.refinement.faults.cautions import keeping_warnings, with_cautions_of_motion
 from hovi.planning.refinement.resolution import with_check
 from hovi.planning.search.branch_choice import Ends, chosen_ends, nearest_ends
@@ -54,6 +55,8 @@ from hovi.system.interruption import interruptible
 from hovi.system.progress import Progress, shows_progress, silent
 
 Keywords = ParamSpec("Keywords")
+ASKED_GOAL = "goal"
+"""The key of a motion's metadata with the goal of a frame that it was planned to, as a table."""
 UNSEEN = Status.INFEASIBLE, Status.DIVERGED, Status.TIME_LIMIT
 """Statuses of motions in which self-collision is not looked for."""
 
@@ -193,6 +196,9 @@ def _planned(
     search = planning.search(job, deadline, progress or silent)
     reason = "" if search.ends is None else search.ends.reason
     found = infeasible_at_once(longest, chosen.guess, reason) if reason else search.run(began)
+    if isinstance(goal, FrameGoal):
+        motion = with_metadata(found.trajectory, **{ASKED_GOAL: goal.to_table()})
+        found = dataclasses.replace(found, trajectory=motion)
     return with_notes(found, [search.fine.scene], search.fine.options, apart)
 
 
