@@ -87,7 +87,7 @@ def _goal(motion: Trajectory) -> State | FrameGoal:
     if not isinstance(asked, dict) or robot is None:
         return last
     goal = as_end(asked, robot, "goal")
-    return dataclasses.replace(goal, guess=last.q) if isinstance(goal, FrameGoal) else last
+    return dataclasses.replace(goal, guess=motion.q[-1]) if isinstance(goal, FrameGoal) else last
 
 
 def _kept(motion: Trajectory) -> tuple[Keep, ...]:
