@@ -68,6 +68,7 @@ LIBRARIES = {
         "import mujoco",
         """
 model = mujoco.MjModel.from_xml_path(path)
+model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT  # contacts of links that meet
 data, tau = mujoco.MjData(model), []
 for q, v, a in rows:
     data.qpos[:], data.qvel[:], data.qacc[:] = q, v, a
