@@ -1,15 +1,27 @@
-"""Pictures of the gallery: the curves of the motions that an example plans."""
+"""Pictures of the gallery: the robot halfway through a motion, and the curves of the motions."""
 
 from __future__ import annotations
 
+from itertools import islice
+from pathlib import Path
 from typing import Any
 
+from PIL import Image
+
 import hovi
+from hovi.exchange.film.pictures import pictures
+from hovi.exchange.film.shot import Shot
 from hovi.viewing.plotting import motion_figure
+
+SIZE = 640, 448
+"""Width and height of the picture of a robot, in the proportions of a thumbnail."""
 
 
 def scrape_motion(block: Any, variables: dict[str, Any], gallery: dict[str, Any]) -> str:
-    """The curves of the newest motion below the code that plans it; its thumbnail, too."""
+    """The curves of the newest motion below the code that plans it.
+
+    Above those of an example's first motion is its robot, which is the thumbnail of the example.
+    """
     from sphinx_gallery.scrapers import figure_rst
 
     seen = variables.setdefault("hovi_seen", set())
@@ -19,9 +31,21 @@ def scrape_motion(block: Any, variables: dict[str, Any], gallery: dict[str, Any]
     seen.update(map(id, motions))
     if not new:
         return ""
+    drawn: list[str] = []
+    if not variables.get("hovi_drawn") and new[-1].robot is not None:
+        variables["hovi_drawn"] = True
+        drawn.append(next(variables["image_path_iterator"]))
+        draw_halfway(new[-1], Path(drawn[-1]))
     path = next(variables["image_path_iterator"])
     try:
         motion_figure(new[-1]).savefig(path, dpi=80)
+        drawn.append(path)
     except hovi.HoviError:  # a motion without torques between its nodes
-        return ""
-    return str(figure_rst([path], gallery["src_dir"]))
+        pass
+    return "\n".join(str(figure_rst([each], gallery["src_dir"])) for each in drawn)
+
+
+def draw_halfway(motion: hovi.Trajectory, path: Path) -> None:
+    """Write a picture of the robot halfway through a motion."""
+    *_, halfway = islice(pictures(motion, 2.0 / motion.duration, Shot(SIZE)), 2)
+    Image.fromarray(halfway).save(path)

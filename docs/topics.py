@@ -2,7 +2,7 @@
 
 TOPICS = {
     "Plan a motion": [
-        *("plan", "PlanOptions", "Solution", "Status", "Tolerance", "Accuracy"),
+        *("plan", "PlanOptions", "Solution", "Iterate", "Status", "Tolerance", "Accuracy"),
         *("plan_task", "Task", "load_task", "save_task", "load_motion_plan_request", "example"),
     ],
     "Robots and scenes": ["load_robot", "Robot", "Scene", "chain", "inverse_kinematics"],

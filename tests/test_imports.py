@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 import pkgutil
 import subprocess
@@ -139,3 +140,36 @@ def test_a_text_report_loads_no_plotting_package() -> None:
     loaded = python("import sys, hovi.cli.reports.plan; print(*sys.modules)")
     assert "hovi.cli.reports.plan" in loaded
     assert not {"matplotlib", "meshcat", "scipy", "rich"} & set(loaded)
+
+
+ORDERS = [" ".join(each) for each in itertools.permutations(("hovi", "casadi", "pinocchio"))]
+TOGETHER = """
+import importlib, sys
+for name in sys.argv[1:]:
+    importlib.import_module(name)
+import hovi
+robot = hovi.load_robot(hovi.example("two_link.urdf"))
+costs = hovi.effects.RunningCost({"v": "dot(v, v)"})
+scene = hovi.Scene(robot, [hovi.effects.Gravity(), costs])
+found = hovi.plan(scene, [0.0, 0.0], [0.4, 0.3], 1.0, limits="none")
+import casadi, numpy as np, pinocchio
+x = casadi.SX.sym("x")
+assert float(casadi.Function("f", [x], [x * x])(3.0)) == 9.0
+model = found.trajectory.scene.robot.model
+data = model.createData()
+q = found.trajectory.q[3]
+energy = pinocchio.computePotentialEnergy(model, data, q)
+assert np.isfinite(energy) and found.success, found.message
+print(repr(found.cost))
+"""
+"""Uses all three in one process, where hovi shares the types of the other two."""
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_hovi_is_imported_before_and_after_the_libraries_whose_types_it_shares(order: str) -> None:
+    """A second copy of one of them would crash the process, or refuse its values."""
+    done = subprocess.run(
+        [sys.executable, "-c", TOGETHER, *order.split()], capture_output=True, text=True
+    )
+    assert done.returncode == 0, (done.returncode, done.stderr[-2000:])
+    assert float(done.stdout) == pytest.approx(32.157498945, rel=1e-9)  # without the others

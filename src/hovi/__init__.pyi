@@ -82,6 +82,7 @@ from .planning.search.options import PlanOptions as PlanOptions
 from .planning.search.planner import plan as plan
 from .planning.sequence.segment import Segment as Segment
 from .planning.sequence.sequence_planner import plan_sequence as plan_sequence
+from .planning.solver.iterates import Iterate as Iterate
 from .planning.solver.outcome.limit_margins import LimitMargins as LimitMargins
 from .planning.solver.outcome.margins import Margins as Margins
 from .planning.solver.outcome.solution_factor import SolutionFactor as SolutionFactor

@@ -78,6 +78,10 @@ class UnmeasurableError(HoviError):
     """A method cannot solve a scene, or there is no reference motion to compare methods with."""
 
 
+class CancelledError(HoviError):
+    """A plan was cancelled before it had a motion."""
+
+
 class DisplayError(HoviError):
     """A figure, a page or a viewer cannot be created."""
 

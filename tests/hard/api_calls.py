@@ -592,9 +592,10 @@ def _plans() -> list[Call]:
         **{"guess": "cubic", "turns": None, "weight": None, "continuation": False},
         **{"group": None},
     }
+    unwatched = {"progress": None, "options": None, "on_iterate": None, "cancel": None}
     ends, limits = ([0.0, 0.0], [0.3, 0.7]), hovi.as_limits(robot(), {"base": "none", "v": 1.0})
     return [
-        call(hovi.plan, scene(), *ends, 1.0, progress=None, options=None, **quick, **options),
+        call(hovi.plan, scene(), *ends, 1.0, **unwatched, **quick, **options),
         call(hovi.plan, scene(), *ends, (0.5, 1.0), **quick),
         call(hovi.plan, scene(), *ends, 1.0, smooth=True, **quick),
         call(hovi.plan, _with_hand(), np.zeros(9), np.zeros(9), 1.0, group="arm", **quick),
@@ -616,7 +617,11 @@ def _plans() -> list[Call]:
             *("resolved", robot(), "start"),
         ),
         build(hovi.PlanOptions, **quick, **options),
-        call(hovi.plan_task, _task(), progress=None, intervals=2),
+        call(
+            hovi.plan_task,
+            _task(),
+            **{"progress": None, "on_iterate": None, "cancel": None, "intervals": 2},
+        ),
         call(
             hovi.solve,
             problem(),
@@ -727,7 +732,7 @@ def _sequences() -> list[Call]:
         call(
             hovi.plan_sequence,
             *(scene(), [0.0, 0.0], segments),
-            **{"progress": None, "options": None, **quick},
+            **{"progress": None, "options": None, "on_iterate": None, "cancel": None, **quick},
         ),
         call(
             hovi.Task.of_segments,

@@ -16,8 +16,8 @@ from hovi.errors import HoviError, InputError
 GOOD = (Verdict.REFUSED, Verdict.ACCEPTED)
 LEFT_OUT = {
     # results, which hovi makes
-    *("Accuracy", "Certificate", "Flow", "MotionError", "Simulation", "Solution", "Status"),
-    *("Tolerance", "Tracking", "Robot", "HoviError"),
+    *("Accuracy", "Certificate", "Flow", "MotionError", "Iterate", "Simulation", "Solution"),
+    *("Status", "Tolerance", "Tracking", "Robot", "HoviError"),
     *("Extreme", "Extremes", "LimitSet", "LimitSource", "MujocoReplay"),
     # abstract
     "Function",

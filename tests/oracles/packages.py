@@ -48,7 +48,7 @@ INSIDE = {
     ],
     "viewing": [{"curves", "meshes"}, {"panel"}, {""}, {"documents"}],
     "accuracy": [{""}, {"effect_study", "peers"}],
-    "study": [{"cells"}, {"axes"}, {"storage"}, {"running"}, {""}, {"showing"}],
+    "study": [{"cells"}, {"axes"}, {"storage"}, {"running"}, {"showing"}, {""}],
     "exchange": [{""}, {"film"}],
     "cli": [{"arguments", "reports"}, {"commands"}, {""}],
 }

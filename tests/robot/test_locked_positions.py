@@ -100,7 +100,11 @@ def test_a_follower_is_locked_at_its_multiple_and_offset(tmp_path: Path, mimic: 
         ({"panda_finger_joint1": np.nan}, InputError, "their positions in rad or m"),
         ({"panda_finger_joint1": True}, InputError, "their positions in rad or m"),
         ({"panda_finger_joint1": np.complex128(0.01)}, InputError, "their positions in rad or m"),
-        ({"panda_finger_joint1": np.timedelta64(0)}, InputError, "their positions in rad or m"),
+        (
+            {"panda_finger_joint1": np.timedelta64(0, "s")},
+            InputError,
+            "their positions in rad or m",
+        ),
         ({1: 0.0}, InputError, "names of joints"),
     ],
 )

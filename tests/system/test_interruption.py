@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,9 @@ from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.goals import Via
 from hovi.scene.effort_lagrangian import EffortLagrangian
 from hovi.scene.scene import Scene
+from hovi.system.deadline import raise_if_late
 from hovi.system.interruption import (
+    cancelled_by,
     interrupted,
     interruptible,
     raise_if_interrupted,
@@ -73,6 +76,26 @@ def test_no_interrupt_is_recorded_outside_of_a_call() -> None:
     record_interrupt()
     assert not interrupted()
     raise_if_interrupted()
+
+
+@pytest.mark.parametrize("look", [raise_if_late, raise_if_interrupted])
+def test_what_cancels_is_an_interrupt_once_and_stays_recorded(look: Callable[[], None]) -> None:
+    asked = list[bool]()
+
+    def cancel() -> bool:
+        asked.append(len(asked) > 1)
+        return asked[-1]
+
+    with cancelled_by(cancel):
+        look()
+        look()
+        assert not interrupted()
+        with pytest.raises(KeyboardInterrupt):
+            look()
+        raise_if_late()  # which leaves the end of the call to be computed
+        assert interrupted()
+    assert not interrupted()
+    assert asked == [False, False, True]
 
 
 @pytest.mark.parametrize("discarded", [False, True])

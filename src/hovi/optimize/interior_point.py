@@ -44,6 +44,7 @@ from hovi.optimize.bounded_steps import LAST_MU, SHORT_FRACTION, BoundedStep, Bo
 from hovi.optimize.criteria import Criteria
 from hovi.optimize.ended import FEASIBILITY_TOLERANCE, Ended, Iteration, Outputs, Reason
 from hovi.optimize.kkt_model import size_of
+from hovi.optimize.observed import between_steps
 from hovi.optimize.quadratic_model import (
     ACCEPTED_RATIO,
     QuadraticModel,
@@ -51,8 +52,6 @@ from hovi.optimize.quadratic_model import (
     next_shift,
 )
 from hovi.optimize.start import Start
-from hovi.system.deadline import raise_if_late
-from hovi.system.interruption import raise_if_interrupted
 
 Array = npt.NDArray[np.float64]
 X = TypeVar("X")
@@ -173,12 +172,10 @@ class _Iteration(BoundedSteps[X]):
         if not np.isfinite(self.ended.value):
             raise ArithmeticError("the objective is not defined at the first point")
         self.ended.keep_best(self.objective.bounds)
-        raise_if_interrupted()
-        raise_if_late()
+        between_steps(self.objective, self.ended.x)
         model = self.model()
         while len(self.ended.steps) < self.criteria.max_iterations:
-            raise_if_interrupted()
-            raise_if_late()
+            between_steps(self.objective, self.ended.x)
             step = self.step(model)
             accepted = self._try(step, model)
             finished = self._finished(step, accepted)

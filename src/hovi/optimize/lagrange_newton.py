@@ -20,10 +20,9 @@ import numpy.typing as npt
 from hovi.optimize.criteria import Criteria
 from hovi.optimize.ended import Ended, Iteration, Outputs, Reason
 from hovi.optimize.kkt_model import EqualityObjective, KktFactor, KktModel, size_of
+from hovi.optimize.observed import between_steps
 from hovi.optimize.restoration import restore
 from hovi.optimize.start import Start
-from hovi.system.deadline import raise_if_late
-from hovi.system.interruption import raise_if_interrupted
 
 Array = npt.NDArray[np.float64]
 X = TypeVar("X")
@@ -137,8 +136,7 @@ class _Search(Generic[X]):
         if not (math.isfinite(self.ended.value) and np.isfinite(self.ended.outputs.y).all()):
             raise ArithmeticError("the problem is not defined at the first point")
         while len(self.ended.steps) < self.criteria.max_iterations:
-            raise_if_interrupted()
-            raise_if_late()
+            between_steps(self.objective, self.ended.x)
             model = self.objective.model(self.ended.x, self.ended.z)
             factor, shift = self._factor(model)
             if factor is not None and self._step(model, factor, shift):

@@ -27,10 +27,9 @@ from hovi.optimize.barrier import Barrier
 from hovi.optimize.bounded_objective import BoundedObjective
 from hovi.optimize.criteria import ROOM, Criteria
 from hovi.optimize.ended import Ended, Iteration, Reason
+from hovi.optimize.observed import between_steps
 from hovi.optimize.quadratic_model import QuadraticModel
 from hovi.optimize.start import Start
-from hovi.system.deadline import raise_if_late
-from hovi.system.interruption import raise_if_interrupted
 
 Array = npt.NDArray[np.float64]
 X = TypeVar("X")
@@ -99,8 +98,7 @@ class _Newton(Generic[X]):
         """Iterate until stationary, or until it does not converge."""
         ended = self.ended
         while self.outside <= self.farthest:  # not where it is no number
-            raise_if_interrupted()
-            raise_if_late()
+            between_steps(self.objective, ended.x)
             terms = ended.z.condensed(ended.outputs.y)
             model = self.objective.model(ended.x, *terms)
             factor = model.factor(0.0)

@@ -16,9 +16,8 @@ import numpy.typing as npt
 from hovi.optimize.criteria import Criteria
 from hovi.optimize.ended import Ended, Iteration, Reason
 from hovi.optimize.kkt_model import EqualityObjective, KktModel, size_of
+from hovi.optimize.observed import between_steps
 from hovi.optimize.start import Start
-from hovi.system.deadline import raise_if_late
-from hovi.system.interruption import raise_if_interrupted
 
 Array = npt.NDArray[np.float64]
 X = TypeVar("X")
@@ -61,8 +60,7 @@ def restore(
         return ended
     step_of = _step
     while len(ended.steps) < min(criteria.max_iterations, MAX_STEPS):
-        raise_if_interrupted()
-        raise_if_late()
+        between_steps(objective, ended.x)
         size = size_of(ended.outputs.y)
         if size <= RESTORED * first or objective.feasible(ended.x):
             ended.why = Reason.STATIONARY

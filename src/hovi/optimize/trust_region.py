@@ -19,6 +19,7 @@ import numpy.typing as npt
 from hovi.optimize.chord_steps import REMAINING_DECREASE, polish
 from hovi.optimize.criteria import Criteria
 from hovi.optimize.ended import Ended, Iteration, Outputs, Reason
+from hovi.optimize.observed import between_steps
 from hovi.optimize.quadratic_model import (
     ACCEPTED_RATIO,
     Factor,
@@ -28,8 +29,6 @@ from hovi.optimize.quadratic_model import (
     next_shift,
 )
 from hovi.optimize.start import Start
-from hovi.system.deadline import raise_if_late
-from hovi.system.interruption import raise_if_interrupted
 
 Array = npt.NDArray[np.float64]
 X = TypeVar("X")
@@ -152,14 +151,12 @@ def _iterate(
 ) -> None:
     if not math.isfinite(ended.value):
         raise ArithmeticError("the objective is not defined at the first point")
-    raise_if_interrupted()
-    raise_if_late()
+    between_steps(objective, ended.x)
     radius, shift = criteria.radius, 0.0
     values = deque([ended.value], STALLED_STEPS + 1)
     model, exact, before = objective.model(ended.x, None, None), True, math.inf
     while len(ended.steps) < criteria.max_iterations:
-        raise_if_interrupted()
-        raise_if_late()
+        between_steps(objective, ended.x)
         trial = solve_subproblem(model, radius, shift)
         stationary = _is_stationary(objective, ended, model, trial, criteria)
         if stationary and trial.along_negative_curvature and not criteria.escape_saddles:

@@ -31,6 +31,9 @@ if TYPE_CHECKING:
     import pandas as pd
     import polars as pl
 
+    from hovi.study.showing.state import StudyState
+    from hovi.viewing.curves.shown_figure import ShownFigure
+
 FrameKind = Literal["pandas", "polars"]
 LOCAL = "local"
 """The scheduler that a run starts on this machine."""
@@ -193,7 +196,23 @@ class Study:
     def _about(self) -> About:
         assert self._toml is not None
         template = self.cells.template
-        return About(template.hash, __version__, self._toml.text, str(template.toml.path))
+        known = template.hash, __version__, self._toml.text, str(template.toml.path)
+        return About(*known, self.count, self._coordinates())
+
+    def _coordinates(self) -> tuple[str, ...]:
+        """See About."""
+        fields = (path.text for axis in self.cells.axes for path in axis.fields)
+        if any(text.startswith("robot") for text in fields):
+            return ()
+        template = self.cells.template
+        try:
+            robot = template.task(template.table, SceneCache()).scene.robot
+        except HoviError:  # as where an axis gives what the file lacks
+            return ()
+        if robot.nq != robot.nv:
+            return ()
+        units = zip(robot.coordinate_names, robot.coordinate_units, strict=True)
+        return tuple(f"{name} [{unit.q}]" for name, unit in units)
 
     @staticmethod
     def load(folder: str | Path, frame: FrameKind = "pandas") -> pd.DataFrame | pl.DataFrame:
@@ -215,6 +234,43 @@ class Study:
         """runs.parquet of a study: when, where and how long each plan was computed."""
         require_extra("pandas", "study")
         return read_table(Path(folder) / RUNS).to_pandas()
+
+    @staticmethod
+    def state(folder: str | Path) -> StudyState:
+        """How far a study is, while it runs or later: `text()` says it in a line.
+
+        The folder is only read, so that a run is not disturbed. Raises StudyError if it holds none.
+        """
+        from hovi.study.showing.state import StudyState
+
+        return StudyState.read(Path(folder))
+
+    @staticmethod
+    def map(
+        folder: str | Path, over: tuple[str, str] | None = None, value: str = "cost"
+    ) -> ShownFigure:
+        """A column of plans.parquet over two parameters, as a figure that a notebook shows.
+
+        over: names of the parameters, along x and y; the first two that vary by default. Where
+            several plans have the same values of both, the best one is drawn. value: the column.
+        Raises StudyError without a table, and InputError for columns that it has not, or that are
+        no numbers.
+        """
+        from hovi.study.showing.charts import map_of
+        from hovi.study.showing.plans import Plans
+
+        return map_of(Plans.read(Path(folder)), over, value)
+
+    @staticmethod
+    def histograms(folder: str | Path) -> ShownFigure:
+        """How plans ended, and what minima cost and took, as a figure that a notebook shows.
+
+        Raises StudyError without a table.
+        """
+        from hovi.study.showing.charts import histograms_of
+        from hovi.study.showing.plans import Plans
+
+        return histograms_of(Plans.read(Path(folder)))
 
     @staticmethod
     def motion(folder: str | Path, key: str, package_dirs: Iterable[str | Path] = ()) -> Trajectory:

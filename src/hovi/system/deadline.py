@@ -11,6 +11,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 
+from hovi.system.interruption import raise_if_cancelled
+
 _end: ContextVar[float | None] = ContextVar("hovi_deadline", default=None)
 """The end of the deadline in force, by the monotonic clock."""
 
@@ -80,6 +82,7 @@ def is_late() -> bool:
 
 
 def raise_if_late() -> None:
-    """Raise OutOfTimeError if the deadline in force has passed."""
+    """Raise OutOfTimeError if the deadline in force has passed, KeyboardInterrupt if cancelled."""
+    raise_if_cancelled()
     if is_late():
         raise OutOfTimeError

@@ -40,9 +40,15 @@ style-src 'unsafe-inline'; img-src data: blob:; connect-src data: blob:{socket}"
 
 _OFFLINE = """<script>
 async function unpacked(text) {{
-    const packed = Uint8Array.from(atob(text), c => c.charCodeAt(0));
+    const bytes = atob(text), packed = new Uint8Array(bytes.length);
+    for (let i = 0; i < bytes.length; i++) packed[i] = bytes.charCodeAt(i);
     const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
     return new Uint8Array(await new Response(stream).arrayBuffer());
+}}
+function joined(parts) {{
+    const whole = new Uint8Array(parts.reduce((sum, part) => sum + part.length, 0));
+    parts.reduce((at, part) => (whole.set(part, at), at + part.length), 0);
+    return whole;
 }}
 (async () => {{
     const [script, content] = await Promise.all([unpacked("{script}"), unpacked("{content}")]);
@@ -52,18 +58,21 @@ async function unpacked(text) {{
     const ends = {sizes}.map((sum => size => sum += size)(0));
     const parts = ends.map((end, i) => content.subarray(i > 0 ? ends[i - 1] : 0, end));
     for (const numbers of {messages}) {{
-        viewer.handle_command_bytearray(
-            new Uint8Array(await new Blob(numbers.map(i => parts[i])).arrayBuffer()));
+        viewer.handle_command_bytearray(joined(numbers.map(i => parts[i])));
     }}
     viewer.animator.mixer.timeScale = {speed};
 }})();
 </script>"""
-"""Unpacks meshcat and the page's own script, then the messages, each of which consists of parts."""
+"""Unpacks meshcat and the page's own script, then the messages, each of which consists of parts.
+
+All messages are handled at once: between two of them the browser would draw what is there so far.
+"""
 _LARGE_ARRAY = 1_000
 """Size from which an array is a part of its own, in [bytes]: equal parts are packed once."""
 
 _UNPACK = """<!DOCTYPE html><meta charset="utf-8"><script>
-const packed = Uint8Array.from(atob("{packed}"), c => c.charCodeAt(0));
+const bytes = atob("{packed}"), packed = new Uint8Array(bytes.length);
+for (let i = 0; i < bytes.length; i++) packed[i] = bytes.charCodeAt(i);
 const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
 new Response(stream).text().then(text => {{
     document.open(); document.write(text); document.close();

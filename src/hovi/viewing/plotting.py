@@ -48,6 +48,8 @@ Mask = npt.NDArray[np.bool_]
 
 _CURVE_POINTS = 2_000
 _MAX_MARKED_INTERVALS = 150
+_MAX_MARKED_COORDINATES = 28
+"""Number of curves up to which nodes are marked; those of more have styles that come again."""
 _SURFACE_TIMES = 180
 _SECTIONS = 25
 _STRIPS = 20
@@ -313,7 +315,7 @@ def _lines(
         color, line = style.color, np.hstack([y[:, :, i], gap]).ravel()
         (drawn,) = ax.plot(broken, line, color=color, linewidth=1.4, label=names[i] + side)
         drawn.set_linestyle(style.line)
-        if len(t) <= _MAX_MARKED_INTERVALS:
+        if len(t) <= _MAX_MARKED_INTERVALS and y.shape[-1] <= _MAX_MARKED_COORDINATES:
             ends = np.s_[:, [0, -1]]
             ax.plot(t[ends].ravel(), y[:, :, i][ends].ravel(), ".", color=color, markersize=3)
         if curve.limits is not None:

@@ -22,6 +22,7 @@ from typing import Any, Generic, TypeVar
 import cloudpickle
 
 from hovi.system.deadline import Deadline
+from hovi.system.interruption import raise_if_cancelled
 from hovi.workers.frames import ClosedPipeError, Receiver, send
 from hovi.workers.lost import Lost
 from hovi.workers.serving import IDLE_SECONDS
@@ -159,6 +160,7 @@ class _Crew(Generic[Item, Result]):
     def results(self) -> Iterator[tuple[int, Result | Lost]]:
         """See results_in_workers."""
         while True:
+            raise_if_cancelled()
             yield from self._hand_out()
             if not any(worker.item is not None or not worker.is_ready for worker in self.hands):
                 return

@@ -162,7 +162,7 @@ def test_the_command_prints_the_warning_in_one_line(models: Path, tmp_path: Path
     assert caught[0].startswith("warning: the position range of elbow, -170 to 170 rad, looks like")
 
 
-@pytest.mark.parametrize("value", [np.complex128(0.1), np.timedelta64(0), True, "0.1", None])
+@pytest.mark.parametrize("value", [np.complex128(0.1), np.timedelta64(0, "s"), True, "0.1", None])
 @pytest.mark.parametrize("key", ["tolerance", "margin"])
 def test_a_tolerance_or_a_margin_that_is_no_number_is_refused(
     two_link: Robot, key: str, value: Any
@@ -171,7 +171,7 @@ def test_a_tolerance_or_a_margin_that_is_no_number_is_refused(
         as_limits(two_link, {key: value})
 
 
-@pytest.mark.parametrize("value", [np.complex128(2.0), np.timedelta64(2), None])
+@pytest.mark.parametrize("value", [np.complex128(2.0), np.timedelta64(2, "s"), None])
 @pytest.mark.parametrize("kind", ["q", "v", "tau"])
 def test_a_bound_that_is_no_number_is_refused(two_link: Robot, kind: str, value: Any) -> None:
     for given in (value, [value, 1.0], {"elbow": value}, {"elbow": [0.0, value]}):

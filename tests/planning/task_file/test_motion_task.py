@@ -76,3 +76,25 @@ def test_what_is_for_readers_elsewhere_has_no_path_of_this_machine(
     assert str(tmp_path) not in task_text(task)
     assert 'file = "rock.obj"' in task_text(task, tmp_path)
     assert f'file = "{tmp_path.name}/rock.obj"' in task_text(task, tmp_path.parent)
+
+
+AT = {"frame": "tip", "position": [1.2, 0.0, 1.0]}
+
+
+@pytest.mark.parametrize("options", [{}, {"limits": {"base": "none", "tau": 40.0}}])
+def test_the_goal_of_a_frame_stays_the_goal_of_a_frame(
+    two_link: Robot, tmp_path: Path, options: dict[str, object]
+) -> None:
+    """Also of a motion that was saved; a replan to another goal knows its joints alone."""
+    scene = hovi.Scene(two_link, [hovi.effects.Gravity(9.8)])
+    first = hovi.plan(scene, [0.0, 0.0], AT, 1.0, **options)
+    first.save(tmp_path / "motion.npz")
+    problem = first.problem
+    assert problem is not None
+    task = again(task_of_motion(hovi.Trajectory.load(tmp_path / "motion.npz"), None), tmp_path)
+    assert isinstance(task.goal, hovi.FrameGoal)
+    assert (task.goal.frame, list(np.asarray(task.goal.position))) == ("tip", AT["position"])
+    limits = {"limits": problem.limits} if options else {}
+    assert plan_task(task, **limits).cost == pytest.approx(first.cost, rel=2e-3)
+    moved = first.replan(goal=[0.4, 0.9])
+    assert isinstance(task_of_motion(moved.trajectory, None).goal, hovi.State)

@@ -2,20 +2,33 @@
 
 from __future__ import annotations
 
+import fcntl
 import json
 import shutil
+import threading
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
 
 from hovi.cli.application import main
 from hovi.study.running.progress import StudyProgress
-from hovi.study.showing.charts import draw_against, draw_histograms, draw_map
+from hovi.study.showing.charts import (
+    FARTHEST,
+    _Cells,
+    draw_against,
+    draw_histograms,
+    draw_map,
+    map_of,
+)
 from hovi.study.showing.plans import Plans
 from hovi.study.showing.summary import summary
-from hovi.study.showing.worst_page import shared_pieces, write_worst
+from hovi.study.storage.folder import About, used_alone
 from hovi.study.study import Study
+from hovi.study.worst_page import shared_pieces, write_worst
 from hovi.viewing.replay_session import page_of
 
 pytest.importorskip("pyarrow")
@@ -175,3 +188,117 @@ def test_bad_input_is_one_sentence(
     error = capsys.readouterr().err.strip().splitlines()[-1]
     assert error.startswith("error: ")
     assert what in error
+
+
+def test_the_state_is_told_while_a_study_runs_and_afterwards(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    seen: list[dict[str, object]] = []
+
+    def look(state: StudyProgress) -> None:
+        if state.done and state.failed is None:
+            assert main(["study", "state", str(tmp_path), "--json"]) == 0
+            seen.append(json.loads(capsys.readouterr().out) | {"known": state.done})
+
+    (tmp_path / "study.toml").write_text(STUDY)
+    assert Study.read(tmp_path / "study.toml").run(tmp_path, progress=look).complete
+    first, last = seen[0], Study.state(tmp_path)
+    assert (first["running"], first["count"]) == (True, 18)
+    assert all(int(str(each["known"])) <= int(str(each["done"])) <= 18 for each in seen)
+    assert (last.running, last.done, last.count) == (False, 18, 18)
+    assert last.status == {"minimum": 9, "infeasible": 9}
+    assert last.seconds_left == 0.0
+    assert "18 of 18 done, complete" in last.text()
+    assert main(["study", "state", str(tmp_path)]) == 0
+    assert "9 infeasible" in capsys.readouterr().out
+
+
+def test_the_state_of_a_run_that_was_killed_is_that_of_its_whole_lines(
+    folder: Path, tmp_path: Path
+) -> None:
+    killed = tmp_path / "killed"
+    shutil.copytree(folder, killed, ignore=shutil.ignore_patterns("*.parquet"))
+    (lines,) = (killed / "journal").glob("*.lines")
+    lines.write_bytes(b"".join(lines.read_bytes().splitlines(keepends=True)[:5])[:-9])
+    state = Study.state(killed)
+    assert (state.running, state.done, state.count) == (False, 4, 18)
+    assert state.text() == "4 of 18 done, no run is working on it"
+    old = json.loads((killed / "study.json").read_text())
+    del old["count"], old["coordinates"]
+    (killed / "study.json").write_text(json.dumps(old))
+    assert Study.state(killed).count is None
+    assert About.read(killed) is not None
+    assert main(["study", "state", str(tmp_path)]) == 2
+
+
+def test_a_folder_that_is_looked_at_can_be_used(tmp_path: Path) -> None:
+    """The look of another process holds the lock for a moment only."""
+    with used_alone(tmp_path):
+        pass
+    with (tmp_path / ".lock").open("rb") as lock:
+        fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        threading.Timer(0.03, fcntl.flock, (lock, fcntl.LOCK_UN)).start()
+        with used_alone(tmp_path):
+            pass
+
+
+def test_a_notebook_shows_a_map_that_names_joints_and_units(folder: Path) -> None:
+    (ax, colors) = Study.map(folder).axes
+    assert ax.get_xlabel() == "shoulder at the goal [rad]"
+    assert ax.get_ylabel() == "elbow at the goal [rad]"
+    assert colors.get_ylabel() == "cost"
+    for figure in (Study.map(folder, value="nit"), Study.histograms(folder)):
+        assert figure._repr_png_().startswith(b"\x89PNG")
+
+
+def test_a_map_of_a_grid_has_a_rectangle_for_each_plan_and_none_overlap() -> None:
+    x, y = (each.ravel() for each in np.meshgrid([0.0, 1.0, 4.0], np.linspace(0, 1, 40)))
+    order = np.random.default_rng(0).permutation(len(x))
+    cells = _Cells.of(x[order], y[order])
+    assert sorted(cells.plan.ravel()) == list(range(120))
+    for edges, values in zip(cells.edges, ([0.0, 1.0, 4.0], np.linspace(0, 1, 40)), strict=True):
+        assert np.all(np.diff(edges) > 0)
+        assert np.all((edges[:-1] < values) & (values < edges[1:]))
+    _, i = np.unravel_index(np.argsort(cells.plan.ravel()), cells.plan.shape)
+    np.testing.assert_array_equal(np.array([0.0, 1.0, 4.0])[i], x[order])
+
+
+def test_elsewhere_a_point_of_a_map_has_the_nearest_plan() -> None:
+    rng = np.random.default_rng(0)
+    x, y = rng.uniform(0, 2, 150), rng.uniform(0, 30, 150)
+    cells = _Cells.of(x, y)
+    at = [(edges[1:] + edges[:-1]) / 2 for edges in cells.edges]
+    size = np.ptp(x), np.ptp(y)
+    for row, column in rng.integers(0, len(at[0]), (500, 2)):
+        apart = np.hypot((x - at[0][column]) / size[0], (y - at[1][row]) / size[1])
+        near = apart.min() < FARTHEST / np.sqrt(150)
+        assert cells.plan[row, column] == (np.argmin(apart) if near else -1)
+
+
+def test_a_map_of_a_hundred_thousand_plans_has_no_stripes(folder: Path) -> None:
+    """On a grid of 1,000 x 100 every pixel inside is that of a plan."""
+    few = Plans.read(folder)
+    x, y = (each.ravel().tolist() for each in np.mgrid[0:1:1000j, 0:1:100j])
+    count = len(x)
+    columns = {
+        "goal.q[0]": x,
+        "goal.q[1]": y,
+        "cost": [1.0 + a for a in x],
+        "success": [True] * count,
+        "status": ["minimum"] * count,
+        "key": [""] * count,
+    }
+    plans = Plans(folder, columns, ("goal.q[0]", "goal.q[1]"), {}, coordinates=few.coordinates)
+    figure = map_of(plans)
+    picture = plt_image(figure)
+    box = figure.axes[0].get_window_extent()
+    height = picture.shape[0]
+    rows = slice(int(height - box.y1) + 3, int(height - box.y0) - 3)
+    inside = picture[rows, int(box.x0) + 3 : int(box.x1) - 3, :3]
+    assert not (inside == 255).all(axis=2).any()
+
+
+def plt_image(figure: Figure) -> npt.NDArray[np.uint8]:
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    return np.asarray(canvas.buffer_rgba())

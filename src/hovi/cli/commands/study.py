@@ -113,7 +113,7 @@ def show(
     from hovi.study.showing.charts import draw_against, draw_histograms, draw_map
     from hovi.study.showing.plans import Plans
     from hovi.study.showing.summary import summary
-    from hovi.study.showing.worst_page import write_worst
+    from hovi.study.worst_page import write_worst
 
     for path in (histograms, picture):
         if path is not None:
@@ -135,6 +135,18 @@ def show(
         for path in (histograms, picture, worst):
             if path is not None:
                 print(f"wrote    {path}")
+
+
+@app.command("state")
+def state(
+    folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="The folder of a study.")],
+    json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+) -> None:
+    """Print how far a study is, while it runs or after it ended; its folder is only read."""
+    from hovi.cli.reports.study import print_state
+    from hovi.study.showing.state import StudyState
+
+    print_state(StudyState.read(folder), json)
 
 
 @app.command("motion")

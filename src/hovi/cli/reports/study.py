@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import sys
 from contextlib import ExitStack, suppress
@@ -16,6 +17,7 @@ from hovi.system.progress import progress
 
 if TYPE_CHECKING:
     from hovi.study.running.progress import StudyProgress
+    from hovi.study.showing.state import StudyState
     from hovi.study.study import StudyReport
     from hovi.system.progress import Progress
 
@@ -70,6 +72,20 @@ def print_ending(report: StudyReport, out: Path) -> int:
         print("interrupted: start it again to do the rest")
         return INTERRUPTED
     return 1 if report.lost else 0
+
+
+def print_state(state: StudyState, as_json: bool) -> None:
+    """Print how far a study is, as one JSON object or in lines."""
+    if as_json:
+        last = None if state.last is None else state.last.isoformat()
+        found = dataclasses.asdict(state) | {"last": last, "seconds_left": state.seconds_left}
+        print(json.dumps(finite(found), allow_nan=False))
+        return
+    print(f"plans    {state.text()}")
+    for status, number in state.status.items():
+        print(f"{'':9s}{number:,} {status}")
+    if state.last is not None:
+        print(f"last     {state.last.isoformat(' ', 'seconds')}")
 
 
 def print_summary(found: dict[str, Any], as_json: bool) -> None:

@@ -160,6 +160,20 @@ class FrameGoal:
         inner, world = (np.asarray(each) for each in _axis(self.axis))
         return inner, world
 
+    def to_table(self) -> dict[str, Any]:
+        """As the table [goal] of a scene file, without the guess."""
+        table: dict[str, Any] = {"frame": self.frame}
+        if self.position is not None:
+            table["position"] = _floats(self.position)
+        if self.rotation is not None:
+            table["rpy"] = _floats(pin.rpy.matrixToRpy(np.asarray(self.rotation)))
+        if self.directions is not None:
+            inner, world = self.directions
+            table["axis"] = {"frame": _floats(inner), "world": _floats(world)}
+        if self.free_velocity:
+            table["free_velocity"] = list(self.free_velocity)
+        return table
+
     @property
     def equations(self) -> int:
         """Number of equations: 3 for a position, 3 for a rotation, 2 for an axis."""
@@ -198,6 +212,10 @@ class PoseDifference(Function):
 
     goal: FrameGoal
     robot: Robot
+
+    def __getstate__(self) -> dict[str, Any]:
+        """The state without what is cached, which is computed anew where it was sent to."""
+        return {"goal": self.goal, "robot": self.robot}
 
     @property
     def needs(self) -> frozenset[str]:
@@ -324,3 +342,7 @@ def _rotation(value: npt.ArrayLike) -> Array:
 
 def _norm(x: npt.ArrayLike) -> float:
     return float(np.linalg.norm(np.asarray(x)))
+
+
+def _floats(values: Any) -> list[float]:
+    return [float(each) for each in np.asarray(values)]

@@ -28,6 +28,7 @@ from hovi.planning.problem.notation.smoothing import smoothed
 from hovi.planning.problem.presolve.assumptions import assumptions
 from hovi.planning.problem.presolve.findings import findings
 from hovi.planning.problem.presolve.length_slips import grasped_slips
+from hovi.planning.refinement.error_estimate import with_metadata
 from hovi.planning.refinement.faults.cautions import keeping_warnings, with_cautions_of_motion
 from hovi.planning.refinement.resolution import with_check
 from hovi.planning.search.branch_choice import Ends, chosen_ends, nearest_ends
@@ -39,6 +40,7 @@ from hovi.planning.search.least_duration import least_duration
 from hovi.planning.search.option_fields import spell_out
 from hovi.planning.search.options import PlanOptions
 from hovi.planning.search.search import Search
+from hovi.planning.solver.iterates import Cancel, OnIterate, watched
 from hovi.planning.solver.outcome.self_collision import self_collision_sentence
 from hovi.planning.solver.outcome.without_solve import infeasible_at_once, without_search
 from hovi.planning.solver.solver import Solution
@@ -53,6 +55,8 @@ from hovi.system.interruption import interruptible
 from hovi.system.progress import Progress, shows_progress, silent
 
 Keywords = ParamSpec("Keywords")
+ASKED_GOAL = "goal"
+"""The key of a motion's metadata with the goal of a frame that it was planned to, as a table."""
 UNSEEN = Status.INFEASIBLE, Status.DIVERGED, Status.TIME_LIMIT
 """Statuses of motions in which self-collision is not looked for."""
 
@@ -68,6 +72,8 @@ class _Plan(Protocol[Keywords]):
         duration: Duration,
         progress: Progress | None = None,
         options: PlanOptions | None = None,
+        on_iterate: OnIterate | None = None,
+        cancel: Cancel | None = None,
         *_: Keywords.args,
         **changes: Keywords.kwargs,
     ) -> Solution:
@@ -100,6 +106,8 @@ def plan(
     duration: Duration,
     progress: Progress | None = None,
     options: PlanOptions | None = None,
+    on_iterate: OnIterate | None = None,
+    cancel: Cancel | None = None,
     **changes: Any,
 ) -> Solution:
     """The motion of least 1/2 integral |tau|^2 from a state to a goal.
@@ -117,9 +125,12 @@ def plan(
     progress: called with a line of text and the completed fraction, in [0, 1]; in a notebook, a
         line under the cell by default.
     options: a PlanOptions; the following keywords override it.
+    on_iterate: called with a hovi.Iterate after every step, whose `solution` is the motion so far.
+    cancel: a function without arguments, such as the `is_set` of a threading.Event: once it returns
+        True, the plan ends as by Ctrl-C, with the best motion so far.
     {options}
     Raises InputError, ModelError, SceneError or SchemeError for invalid input, UnreachableError for
-    a start that no configuration reaches.
+    a start that no configuration reaches, CancelledError if it is cancelled before it has a motion.
     """
     began = time.perf_counter()
     if not isinstance(scene, Scene):
@@ -138,9 +149,10 @@ def plan(
         given = start_end, goal_end
     length = as_duration(duration)
     planned = functools.partial(_planned, options.aiming(scene), *given, length, progress)
-    if options.objective == "time":
-        return least_duration(planned, length, options)
-    return planned(options, began)
+    with watched(on_iterate, cancel):
+        if options.objective == "time":
+            return least_duration(planned, length, options)
+        return planned(options, began)
 
 
 def _planned(
@@ -184,6 +196,9 @@ def _planned(
     search = planning.search(job, deadline, progress or silent)
     reason = "" if search.ends is None else search.ends.reason
     found = infeasible_at_once(longest, chosen.guess, reason) if reason else search.run(began)
+    if isinstance(goal, FrameGoal):
+        motion = with_metadata(found.trajectory, **{ASKED_GOAL: goal.to_table()})
+        found = dataclasses.replace(found, trajectory=motion)
     return with_notes(found, [search.fine.scene], search.fine.options, apart)
 
 

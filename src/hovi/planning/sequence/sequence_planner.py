@@ -39,6 +39,7 @@ from hovi.planning.sequence.segment import (
     with_durations,
 )
 from hovi.planning.sequence.sequence_job import job_of
+from hovi.planning.solver.iterates import Cancel, OnIterate, watched
 from hovi.planning.solver.outcome.without_solve import unresolved_at_once
 from hovi.planning.solver.solver import Solution
 from hovi.scene.scene import Scene
@@ -60,6 +61,8 @@ class _PlanSequence(Protocol[Keywords]):
         segments: Sequence[Table],
         progress: Progress | None = None,
         options: PlanOptions | None = None,
+        on_iterate: OnIterate | None = None,
+        cancel: Cancel | None = None,
         *_: Keywords.args,
         **changes: Keywords.kwargs,
     ) -> Solution:
@@ -91,6 +94,8 @@ def plan_sequence(
     segments: Sequence[Table],
     progress: Progress | None = None,
     options: PlanOptions | None = None,
+    on_iterate: OnIterate | None = None,
+    cancel: Cancel | None = None,
     **changes: Any,
 ) -> Solution:
     """Motions one after the other, such as move, grasp, move, release, of least cost together.
@@ -106,13 +111,12 @@ def plan_sequence(
     segments: hovi.Segment(goal, duration, effects=..., limits=..., name=...), or tables as in a
         scene file, {"goal": {"q": ...}, "duration": "1 s", ...}, in order of time; the last one
         needs a goal.
-    progress: called with a line of text and the completed fraction, in [0, 1]; in a notebook, a
-        line under the cell by default.
+    progress, on_iterate, cancel: as for `plan`.
     options: a PlanOptions; the following keywords override it. The `intervals` are those of all
         segments together, and the times of `via` count from the start of the first.
     {options}
     Raises InputError, ModelError, SceneError or SchemeError for invalid input, UnreachableError for
-    a start that no configuration reaches.
+    a start that no configuration reaches, CancelledError if it is cancelled before it has a motion.
     """
     began = time.perf_counter()
     if not isinstance(scene, Scene):
@@ -122,6 +126,19 @@ def plan_sequence(
     chosen = PlanOptions() if options is None else options
     expect(chosen, PlanOptions, "hovi.PlanOptions(...), or its fields by keyword")
     chosen = chosen.with_changes(**changes)
+    with watched(on_iterate, cancel):
+        return _of_segments(scene, start, segments, progress, chosen, began)
+
+
+def _of_segments(
+    scene: Scene,
+    start: Start,
+    segments: Sequence[Table],
+    progress: Progress | None,
+    chosen: PlanOptions,
+    began: float,
+) -> Solution:
+    """The motion in segments. began: when the plan did, by the clock."""
     checked = checked_segments(segments, chosen)
     if len(checked) == 1:
         return _alone(scene, start, checked[0], progress, chosen)

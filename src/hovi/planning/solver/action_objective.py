@@ -113,6 +113,10 @@ class ActionObjective(Objective[DiscretePath]):
         """Coordinates in which the intervals are expanded."""
         return "nodal" if self.algebra == "band" else "regular"
 
+    def motion(self, x: DiscretePath) -> tuple[TrajectoryProblem, DiscretePath]:
+        """The problem and the motion at a point."""
+        return self.problem, x
+
     def value(self, x: DiscretePath) -> float:
         """The discrete action, with the terms of multipliers."""
         return self.value_of(x, self.outputs(x))

@@ -106,6 +106,10 @@ class BoundedAction(BoundedObjective[DiscretePath]):
             self._row_columns = rows.columns(self.action.coordinates)
         self.bounds = Bounds(lower, upper, weights, self.problem.grid.duration)
 
+    def motion(self, x: DiscretePath) -> tuple[TrajectoryProblem, DiscretePath]:
+        """The problem and the motion at a point."""
+        return self.problem, x
+
     def outputs(self, x: DiscretePath) -> Outputs:
         """The discrete action, and the bounded outputs relative to their ranges."""
         outputs = self.action.outputs(x)

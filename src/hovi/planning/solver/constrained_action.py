@@ -62,6 +62,10 @@ class ConstrainedAction(EqualityObjective[DiscretePath]):
         """See EqualityObjective.negligible."""
         return self.problem.negligible_cost
 
+    def motion(self, x: DiscretePath) -> tuple[TrajectoryProblem, DiscretePath]:
+        """The problem and the motion at a point."""
+        return self.problem, x
+
     def evaluate(self, x: DiscretePath) -> Outputs:
         """The action, and c."""
         outputs = self.action.outputs(x)

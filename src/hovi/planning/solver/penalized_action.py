@@ -17,6 +17,7 @@ from hovi.optimize.ended import Ended, Outputs, Reason
 from hovi.optimize.quadratic_model import QuadraticModel
 from hovi.optimize.start import Start
 from hovi.optimize.trust_region import Objective, minimize
+from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.bounded_action import BoundedAction
 
 Array = npt.NDArray[np.float64]
@@ -47,6 +48,10 @@ class PenalizedAction(Objective[DiscretePath]):
     def violation(self, x: DiscretePath) -> float:
         """Largest distance outside the bounds, as a fraction of the range."""
         return float(np.max(np.abs(self._outside(x)), initial=0.0))
+
+    def motion(self, x: DiscretePath) -> tuple[TrajectoryProblem, DiscretePath]:
+        """The problem and the motion at a point."""
+        return self.limited.motion(x)
 
     def value(self, x: DiscretePath) -> float:
         """The penalized action."""

@@ -7,7 +7,6 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
-import pinocchio as pin
 
 from hovi.checks.units import seconds
 from hovi.discrete.grid import outside_motion
@@ -128,19 +127,7 @@ def _time(given: float | str, keys: Keys, toml: TomlText) -> float:
 
 def end_table(goal: State | FrameGoal, robot: Robot, name: str) -> dict[str, Any]:
     """The table from which `read_end` reads a start or a goal. name: of it in messages."""
-    if isinstance(goal, State):
-        return state_table(goal, robot, name)
-    table: dict[str, Any] = {"frame": goal.frame}
-    if goal.position is not None:
-        table["position"] = _floats(goal.position)
-    if goal.rotation is not None:
-        table["rpy"] = _floats(pin.rpy.matrixToRpy(np.asarray(goal.rotation)))
-    if goal.directions is not None:
-        inner, world = goal.directions
-        table["axis"] = {"frame": _floats(inner), "world": _floats(world)}
-    if goal.free_velocity:
-        table["free_velocity"] = list(goal.free_velocity)
-    return table
+    return state_table(goal, robot, name) if isinstance(goal, State) else goal.to_table()
 
 
 def via_table(via: Via, robot: Robot) -> dict[str, Any]:

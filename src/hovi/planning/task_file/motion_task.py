@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import warnings
 from typing import TYPE_CHECKING
 
@@ -13,8 +14,11 @@ from hovi.discrete.state import State
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError
 from hovi.planning.clearance.clearance import Clearance
+from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.limits import Limits, as_limits
+from hovi.planning.problem.notation.ends import as_end
 from hovi.planning.search.options import PlanOptions
+from hovi.planning.search.planner import ASKED_GOAL
 from hovi.planning.sequence.segment import Segment
 from hovi.planning.task_file.task import Task
 from hovi.scene.scene import Scene
@@ -38,8 +42,8 @@ def task_of_motion(
 ) -> Task:
     """A task of which the motion is a solution.
 
-    Its ends are states: what goal they were found from, such as a pose of a hand, a motion does not
-    know. Velocities are given where segments meet.
+    Its ends are states, but for the goal of a frame of a motion without segments, which is as it
+    was asked. Velocities are given where segments meet.
 
     limits, clearance: what the motion was planned within. segment_limits: those of each segment.
     Raises InputError for a motion without a scene, SceneError where scene files have no key.
@@ -57,7 +61,7 @@ def task_of_motion(
     )
     start = _state(motion, 0)
     if len(scenes) == 1:
-        return Task(scenes[0], start, _state(motion, -1), motion.duration, options)
+        return Task(scenes[0], start, _goal(motion), motion.duration, options)
     kinds = set.intersection(*({each.key for each in scene.effects} for scene in scenes))
     common = [each for each in scenes[0].effects if each.key in kinds]
     segments = [
@@ -72,6 +76,18 @@ def task_of_motion(
     ]
     shared = Scene(scenes[0].robot, common, passive=scenes[0].passive, begin=scenes[0].begin)
     return Task.of_segments(shared, start, segments, options)
+
+
+def _goal(motion: Trajectory) -> State | FrameGoal:
+    """The goal of a frame as it was asked, with the last configuration as its guess; or that.
+
+    Raises InputError for a table in the motion that is none of a goal.
+    """
+    asked, robot, last = motion.metadata.get(ASKED_GOAL), motion.robot, _state(motion, -1)
+    if not isinstance(asked, dict) or robot is None:
+        return last
+    goal = as_end(asked, robot, "goal")
+    return dataclasses.replace(goal, guess=motion.q[-1]) if isinstance(goal, FrameGoal) else last
 
 
 def _kept(motion: Trajectory) -> tuple[Keep, ...]:

@@ -9,21 +9,28 @@ from hovi.checks.arguments import check_arguments
 from hovi.discrete.output.caution import LEFT_OUT, Caution
 from hovi.planning.refinement.faults.cautions import with_cautions_of_motion
 from hovi.planning.search.planner import plan
+from hovi.planning.solver.iterates import Cancel, OnIterate
 from hovi.planning.solver.solver import Solution
 from hovi.planning.task_file.task import Task
 from hovi.system.progress import Progress
 
 
 @check_arguments
-def plan_task(task: Task, progress: Progress | None = None, **changes: Any) -> Solution:
+def plan_task(
+    task: Task,
+    progress: Progress | None = None,
+    on_iterate: OnIterate | None = None,
+    cancel: Cancel | None = None,
+    **changes: Any,
+) -> Solution:
     """Plan a task with its options.
 
     task: the scene, the ends, the duration or the segments, and the options.
-    progress: called with a line of text and the completed fraction, in [0, 1].
+    progress, on_iterate, cancel: as for `plan`.
     changes: options that override those of the task.
     Raises as `plan` does.
     """
-    found = _planned(task, progress, **changes)
+    found = _planned(task, progress, on_iterate=on_iterate, cancel=cancel, **changes)
     note = "" if "self_collision" in changes else task.note
     if not note:
         return found

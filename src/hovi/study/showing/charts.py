@@ -2,25 +2,37 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
+from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 
 from hovi.errors import InputError
 from hovi.study.showing.plans import Plans
+from hovi.system.dataclass import dataclass
+from hovi.viewing.curves.shown_figure import ShownFigure
 from hovi.viewing.figures import write_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.collections import QuadMesh
 
 Array = npt.NDArray[np.float64]
 
 BINS = 30
 MAX_POINTS = 20_000
 """Largest number of points of a scatter plot; of more, equally spaced ones are drawn."""
+SPARSE = 4
+"""Number of places on a grid of all values, per plan, from which plans are on no grid."""
+PIXELS = 400
+"""Pixels of a map along each side, where plans are on no grid."""
+FARTHEST = 2.0
+"""Distance up to which a pixel has the color of a plan, relative to 1 / sqrt(number of plans), both
+axes having length 1."""
 LOG_RANGE = 30.0
 """Ratio of the 98th to the 2nd percentile from which a scale is logarithmic."""
 HISTOGRAMS = ("cost", "nit", "margin", "seconds")
@@ -33,7 +45,8 @@ _LABELS = {
     "seconds": "wall time of a plan [s]",
     "motion_duration": "duration [s]",
 }
-_COORDINATES = {"[0]": "x", "[1]": "y", "[2]": "z"}
+_COORDINATES = "x", "y", "z"
+_ENTRY = re.compile(r"(start|goal)\.(q|position)\[(\d+)\]")
 _FAILED = {
     "unreachable": ("#b8b8b8", "no configuration meets it"),
     "infeasible": ("#c0392b", "infeasible"),
@@ -43,21 +56,27 @@ _OTHER = ("#e67e22", "no resolved minimum")
 
 
 def draw_histograms(plans: Plans, path: Path) -> None:
+    """Write `histograms_of` to a file."""
+    write_figure(histograms_of(plans), path)
+
+
+def histograms_of(plans: Plans) -> ShownFigure:
     """Histograms of what minima cost and take, and how many plans ended how."""
     success = plans.success
     values = {name: plans.numbers(name)[success] for name in HISTOGRAMS}
     drawn = {name: x[np.isfinite(x)] for name, x in values.items() if np.isfinite(x).any()}
-    figure = Figure(figsize=(9.0, 2.6 * (1 + (len(drawn) + 1) // 2)), layout="constrained")
-    axes = figure.subplots(1 + (len(drawn) + 1) // 2, 2, squeeze=False).ravel()
+    rows = 1 + len(drawn) // 2
+    figure = ShownFigure(figsize=(9.0, 2.6 * rows), layout="constrained")
+    axes = figure.subplots(rows, 2, squeeze=False).ravel()
     _draw_status(axes[0], plans)
     for ax, (name, numbers) in zip(axes[1:], drawn.items(), strict=False):
         logarithmic = _is_wide(numbers)
         ax.hist(numbers, bins=_bins(numbers, logarithmic), color="#2e6f9e")
         ax.set_xscale("log" if logarithmic else "linear")
-        ax.set(xlabel=_label(name), ylabel="plans")
+        ax.set(xlabel=_label(name, plans), ylabel="plans")
     for ax in axes[1 + len(drawn) :]:
         ax.set_axis_off()
-    write_figure(figure, path)
+    return figure
 
 
 def draw_against(plans: Plans, parameter: str, path: Path, value: str = "cost") -> None:
@@ -77,16 +96,21 @@ def draw_against(plans: Plans, parameter: str, path: Path, value: str = "cost") 
         label = "without a minimum"
         ax.plot(x[failed], np.full(len(failed), 0.02), "|", color="#c0392b", transform=bottom)
         ax.plot([], [], "|", color="#c0392b", label=label)
-        ax.legend()
+        figure.legend(loc="outside lower center", ncols=2, fontsize=8)
     if _is_wide(y[found]):
         ax.set_yscale("log")
-    ax.set(xlabel=_label(parameter), ylabel=_label(value))
+    ax.set(xlabel=_label(parameter, plans), ylabel=_label(value, plans))
     write_figure(figure, path)
 
 
 def draw_map(
     plans: Plans, path: Path, over: tuple[str, str] | None = None, value: str = "cost"
 ) -> None:
+    """Write `map_of` to a file."""
+    write_figure(map_of(plans, over, value), path)
+
+
+def map_of(plans: Plans, over: tuple[str, str] | None = None, value: str = "cost") -> ShownFigure:
     """A column over two parameters: where minima are, what they cost, and where there are none.
 
     over: names of the parameters, along x and y; the first two that vary by default. Where several
@@ -99,66 +123,91 @@ def draw_map(
                 "a map needs two parameters that vary; give a parameter with --against."
             )
         over = plans.varying[0], plans.varying[1]
-    x, y, z = plans.numbers(over[0]), plans.numbers(over[1]), plans.numbers(value)
-    figure = Figure(figsize=(7.2, 5.8), layout="constrained")
+    x, y = plans.numbers(over[0]), plans.numbers(over[1])
+    z = np.where(plans.success, plans.numbers(value), np.nan)
+    best = _best(x, y, z)
+    shown = _Cells.of(x[best], y[best])
+    figure = ShownFigure(figsize=(7.2, 5.8), layout="constrained")
     ax = figure.subplots()
-    _draw_failures(ax, plans, x, y)
-    best = _best(x, y, np.where(plans.success, z, np.nan))
-    size = _marker_size(x, y)
-    drawn = ax.scatter(
-        *(x[best], y[best]),
-        c=z[best],
-        s=size**2,
-        marker="s",
-        linewidths=0,
-        cmap="viridis",
-        norm="log" if _is_wide(z[best]) else "linear",
-    )
-    figure.colorbar(drawn, ax=ax, label=_label(value))
-    ax.set(xlabel=_label(over[0]), ylabel=_label(over[1]))
+    norm = "log" if _is_wide(z[best]) else "linear"
+    drawn = shown.draw(ax, z[best], cmap="viridis", norm=norm)
+    _draw_failures(ax, shown, np.array(plans.columns["status"])[best], np.isfinite(z[best]))
+    figure.colorbar(drawn, ax=ax, label=_label(value, plans))
+    ax.set(xlabel=_label(over[0], plans), ylabel=_label(over[1], plans))
     if all("position" in name for name in over):
         ax.set_aspect("equal")
     if ax.get_legend_handles_labels()[0]:
         figure.legend(loc="outside lower center", ncols=2, fontsize=8)
     ax.set_title(f"{int(plans.success.sum()):,} of {len(plans):,} plans are minima", fontsize=10)
-    write_figure(figure, path)
+    return figure
 
 
-def _draw_failures(ax: Axes, plans: Plans, x: Array, y: Array) -> None:
+@dataclass(frozen=True, eq=False)
+class _Cells:
+    """The part of a map that each plan has, without overlaps.
+
+    On a grid that is a rectangle up to halfway to its neighbors; elsewhere, all points to which the
+    plan is the nearest one, but for those far from any.
+    edges: of the rectangles, ascending, along x and y. plan: of each, (rows, columns), or -1.
+    """
+
+    edges: tuple[Array, Array]
+    plan: npt.NDArray[np.intp]
+
+    @classmethod
+    def of(cls, x: Array, y: Array) -> _Cells:
+        """Of plans at different places, (M,) each."""
+        (columns, i), (rows, j) = (np.unique(each, return_inverse=True) for each in (x, y))
+        if len(columns) * len(rows) <= SPARSE * len(x):
+            plan = np.full((len(rows), len(columns)), -1, dtype=np.intp)
+            plan[j, i] = np.arange(len(x))
+            return cls((_halfway(columns), _halfway(rows)), plan)
+        from scipy.spatial import cKDTree  # slow to import, and rarely needed
+
+        low, high = np.array([x.min(), y.min()]), np.array([x.max(), y.max()])
+        size = np.where(high > low, high - low, 1.0)
+        reach = FARTHEST / np.sqrt(len(x))
+        sides = np.linspace(-reach, 1.0 + reach, PIXELS + 1)
+        middle = (sides[1:] + sides[:-1]) / 2
+        pixels = np.stack(np.meshgrid(middle, middle), axis=-1)
+        tree = cKDTree((np.stack([x, y], axis=1) - low) / size)
+        far, nearest = tree.query(pixels, distance_upper_bound=reach)
+        edges = low[0] + size[0] * sides, low[1] + size[1] * sides
+        return cls(edges, np.where(np.isfinite(far), nearest, -1))
+
+    def draw(self, ax: Axes, values: Array, **style: Any) -> QuadMesh:
+        """Color the parts of plans by values, (M,); those of NaN stay as they are."""
+        known = np.append(values, np.nan)[self.plan]  # -1 is the last
+        return ax.pcolormesh(*self.edges, np.ma.masked_invalid(known), rasterized=True, **style)
+
+
+def _halfway(values: Array) -> Array:
+    """The edges of cells around ascending values, (n + 1,)."""
+    if len(values) == 1:
+        return np.array([values[0] - 0.5, values[0] + 0.5])
+    middle = (values[1:] + values[:-1]) / 2
+    return np.concatenate([[2 * values[0] - middle[0]], middle, [2 * values[-1] - middle[-1]]])
+
+
+def _draw_failures(
+    ax: Axes, shown: _Cells, status: npt.NDArray[np.str_], success: npt.NDArray[np.bool_]
+) -> None:
     """The places without any minimum, by how plans ended there."""
-    status, success = np.array(plans.columns["status"]), plans.success
-    reached = set(zip(x[success], y[success], strict=True))
-    missed = np.array([place not in reached for place in zip(x, y, strict=True)], dtype=bool)
-    size = _marker_size(x, y)
-    for name in dict.fromkeys(status[missed].tolist()):
+    for name in dict.fromkeys(status[~success].tolist()):
         color, label = _FAILED.get(name, _OTHER)
-        here = (status == name) & missed
-        known = label in ax.get_legend_handles_labels()[1]
-        ax.scatter(
-            *(x[here], y[here]),
-            color=color,
-            s=size**2,
-            marker="s",
-            linewidths=0,
-            label=None if known else label,
-        )
+        here = np.where((status == name) & ~success, 1.0, np.nan)
+        shown.draw(ax, here, cmap=ListedColormap([color]))
+        if label not in ax.get_legend_handles_labels()[1]:
+            ax.plot([], [], "s", color=color, label=label)
 
 
 def _best(x: Array, y: Array, z: Array) -> npt.NDArray[np.intp]:
-    """Rows with a value, of those at one place the one with the least."""
-    rows = np.flatnonzero(np.isfinite(z))
-    rows = rows[np.argsort(z[rows], kind="stable")]
+    """A row for each place: the one with the least value, or the first one without any."""
+    rows = np.argsort(np.where(np.isfinite(z), z, np.inf), kind="stable")
+    rows = rows[np.isfinite(x[rows]) & np.isfinite(y[rows])]
     places = np.stack([x[rows], y[rows]], axis=1)
     _, first = np.unique(places, axis=0, return_index=True)
     return np.asarray(rows[np.sort(first)])
-
-
-def _marker_size(x: Array, y: Array) -> float:
-    """The side of a square in points, so that those of a grid nearly touch."""
-    columns, rows = len(np.unique(x)), len(np.unique(y))
-    if columns * rows > 4 * len(x):  # no grid
-        columns = rows = max(1, int(np.sqrt(len(x))))
-    return float(np.clip(345.0 / max(columns, rows, 1), 1.5, 40.0))
 
 
 def _draw_status(ax: Axes, plans: Plans) -> None:
@@ -188,8 +237,17 @@ def _bins(values: Array, logarithmic: bool) -> Array:
     return np.linspace(low, high, BINS + 1)
 
 
-def _label(name: str) -> str:
+def _label(name: str, plans: Plans) -> str:
+    """What an axis says: the joint or the coordinate that a column is of, with its unit."""
     if name in _LABELS:
         return _LABELS[name]
-    end, _, entry = name.partition(".position")
-    return f"{_COORDINATES[entry]} of the {end} [m]" if entry in _COORDINATES else name
+    found = _ENTRY.fullmatch(name)
+    if found is None:
+        return name
+    end, what, entry = found[1], found[2], int(found[3])
+    if what == "q" and entry < len(plans.coordinates):
+        joint, _, unit = plans.coordinates[entry].rpartition(" ")
+        return f"{joint} at the {end} {unit}"
+    if what == "position" and entry < len(_COORDINATES):
+        return f"{_COORDINATES[entry]} of the {end} [m]"
+    return name

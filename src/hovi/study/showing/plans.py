@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from hovi.errors import InputError, StudyError, nearest
 from hovi.study.cells.extras import require_extra
-from hovi.study.storage.folder import in_use
+from hovi.study.storage.folder import About, in_use
 from hovi.study.storage.index import Index
 from hovi.study.storage.rows import PlanRow
 from hovi.study.storage.tables import PLANS, RUNS, read_table
@@ -28,6 +28,7 @@ class Plans:
 
     folder: of the study. columns: of plans.parquet, by name, as lists. parameters: names of those
     that vary. seconds: that each plan took, by key; of the last run that did it.
+    coordinates: as of About.
     finished: False while a run goes on and after it was killed; cells and parameters are not known.
     """
 
@@ -36,6 +37,7 @@ class Plans:
     parameters: tuple[str, ...]
     seconds: dict[str, float]
     finished: bool = True
+    coordinates: tuple[str, ...] = ()
 
     @classmethod
     def read(cls, folder: Path) -> Plans:
@@ -52,7 +54,10 @@ class Plans:
         parameters = tuple(names[names.index("key") + 1 : names.index("status")])
         runs = read_table(folder / RUNS).to_pydict()
         taken = zip(runs["key"], runs["seconds"], strict=True)
-        return cls(folder, table, parameters, {k: s for k, s in taken if s is not None})
+        seconds = {k: s for k, s in taken if s is not None}
+        about = About.read(folder)
+        known = () if about is None else about.coordinates
+        return cls(folder, table, parameters, seconds, coordinates=known)
 
     @classmethod
     def _so_far(cls, folder: Path, index: Index) -> Plans:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import fcntl
 import json
 import os
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -20,6 +21,9 @@ ABOUT = "study.json"
 FORMAT = "hovi-study"
 VERSION = 1
 _MAX_BYTES = 64_000_000
+TRIES, TRY_AGAIN_SECONDS = 5, 0.02
+"""How often a run tries to lock its folder, and after what time in [s]: `in_use` of another process
+holds the lock for some microseconds."""
 
 
 @dataclass(frozen=True)
@@ -28,12 +32,17 @@ class About:
 
     scene: the hash of its template. version: of hovi.
     text: of STUDY.toml, or the same as JSON. source: the path of the scene file.
+    count: of all plans; None where an earlier version began it.
+    coordinates: names of the entries of q with their units, such as "elbow [rad]"; none where they
+        differ between plans.
     """
 
     scene: str
     version: str
     text: str = ""
     source: str = ""
+    count: int | None = None
+    coordinates: tuple[str, ...] = ()
 
     @property
     def identity(self) -> tuple[str, str]:
@@ -57,14 +66,15 @@ class About:
             if data["format"] != FORMAT or data["format_version"] > VERSION:
                 raise ValueError("another format")
             texts = {name: data[name] for name in ("scene", "version", "text", "source")}
-            if not all(isinstance(text, str) for text in texts.values()):
+            count, names = data.get("count"), data.get("coordinates", ())
+            if not all(isinstance(text, str) for text in (*texts.values(), *names)):
                 raise TypeError
         except (OSError, ValueError, KeyError, TypeError, RecursionError):
             raise StudyError(
                 f"{path} is not the {ABOUT} of a study of this version of hovi: choose another "
                 "folder, or remove this one."
             ) from None
-        return cls(**texts)
+        return cls(**texts, count=None if count is None else int(count), coordinates=tuple(names))
 
 
 @contextmanager
@@ -78,15 +88,25 @@ def used_alone(folder: Path) -> Iterator[None]:
     except ValueError:
         raise StudyError(f"no folder can have the name {str(folder)!r}.") from None
     try:
-        try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
+        if not _locked(descriptor):
             raise StudyError(
                 f"another run is working on the study in {folder}: wait for it, or end it."
-            ) from None
+            )
         yield
     finally:
         os.close(descriptor)
+
+
+def _locked(descriptor: int) -> bool:
+    """Whether the lock was got: not while another run has it, but after one who only looked."""
+    for _ in range(TRIES):
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            time.sleep(TRY_AGAIN_SECONDS)
+            continue
+        return True
+    return False
 
 
 def in_use(folder: Path) -> bool:

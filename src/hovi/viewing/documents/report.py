@@ -57,7 +57,7 @@ _SAMPLES = 401
 _SECONDS = 30.0
 _HASH_SALT = "hovi"  # so that the same motion gives the same picture
 _SCENE_HEAD = (
-    "# The scene of this motion, for hovi plan; start and goal are the joints at its ends.\n"
+    "# The scene of this motion, for hovi plan; its ends are joints, but for the goal of a frame.\n"
 )
 _MAX_SCENE = 60_000  # [characters]
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from hovi.discrete.grid import DiscretePath
 from hovi.optimize.quadratic_model import QuadraticModel
 from hovi.optimize.trust_region import Objective
 from hovi.planning.problem.problem import TrajectoryProblem
@@ -44,6 +45,11 @@ class TimedAction(Objective[TimedPath]):
                 del self._actions[next(iter(self._actions))]
             self._actions[key] = ActionObjective(problem, "band", keep_points=True)
         return self._actions[key]
+
+    def motion(self, x: TimedPath) -> tuple[TrajectoryProblem, DiscretePath]:
+        """The problem of the lengths at a point, and the motion there."""
+        problem = self.problem.lasting(self.price.clock, self.first, x.lengths)
+        return problem, problem.moved(x.path)
 
     def value(self, x: TimedPath) -> float:
         """S + w sum L."""

@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from hovi.discrete.grid import DiscretePath
 from hovi.optimize.bounded_objective import BoundedObjective, Refinement
 from hovi.optimize.ended import Outputs
 from hovi.optimize.quadratic_model import QuadraticModel
+from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.problem.time_price import TimePrice
 from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.bounded_action import BoundedAction
@@ -76,6 +78,11 @@ class TimedBoundedAction(BoundedObjective[TimedPath]):
     def fraction(self, lengths: Array) -> Array:
         """L0 / L, or 1 outside of parts, by which forces of limits count in the integral, (R,)."""
         return np.append(self.lengths / lengths, 1.0)[self._parts]
+
+    def motion(self, x: TimedPath) -> tuple[TrajectoryProblem, DiscretePath]:
+        """The problem of the lengths at a point, and the motion there."""
+        problem = self.first.problem.lasting(self.price.clock, self.lengths, x.lengths)
+        return problem, problem.moved(x.path)
 
     def outputs(self, x: TimedPath) -> Outputs:
         """S + w sum L, and the bounded outputs relative to their ranges."""

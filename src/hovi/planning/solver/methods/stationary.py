@@ -11,13 +11,14 @@ from hovi.discrete.grid import DiscretePath
 from hovi.optimize.banded_model import BandModel
 from hovi.optimize.criteria import Criteria
 from hovi.optimize.ended import STOPS, Reason, why_stopped
+from hovi.optimize.observed import between_steps
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.answer import Answer
 from hovi.planning.solver.methods.method import Guess, Method, Report
 from hovi.planning.solver.outcome.cost_with_time import cost_of
 from hovi.planning.solver.status import Status, chart_sentence, unfinished
-from hovi.system.deadline import Deadline, raise_if_late
+from hovi.system.deadline import Deadline
 
 if TYPE_CHECKING:
     from scipy.sparse import csc_matrix
@@ -91,7 +92,7 @@ class _Search:
         """Take steps until the gradient is one of rounding errors; why it stopped."""
         try:
             for _ in range(most):
-                raise_if_late()
+                between_steps(self.objective, self.x)
                 why = self._step()
                 if why is not None:
                     return why
