@@ -88,7 +88,8 @@ def _end(goal: State | FrameGoal, name: str, robot: Robot) -> list[str]:
     from hovi.planning.problem.frame_goal import FrameGoal
 
     if isinstance(goal, FrameGoal):
-        return [f"{name}: frame {goal.frame!r}", *_frame_parts(goal)]
+        parts = ((f"{name}: frame {x.frame!r}", *_frame_parts(x)) for x in goal.parts)
+        return [line for part in parts for line in part]
     q, v = goal.on(robot, name)
     lines = [f"{name} q = {_numbers(q)}", f"{name} v = {_numbers(v)}"]
     angles = goal.angles_on(robot)

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import functools
+import itertools
 import math
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import field, fields
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import field, fields, replace
 from functools import cached_property, lru_cache
 from typing import Any, TypeVar
 
@@ -16,24 +17,32 @@ import pinocchio as pin
 
 from hovi.checks.arguments import check_arguments
 from hovi.checks.directions import unit_vector
+from hovi.checks.kinds import shown
 from hovi.checks.shapes import numbers_of
 from hovi.conditions.frame_rows import axis_rows, rotation_rows
-from hovi.conditions.function import Curvature, Function, Points, Slopes
+from hovi.conditions.function import Curvature, Function, Points, Slopes, linear
 from hovi.dynamics.point_function import PointFunction
 from hovi.dynamics.symbolic_dynamics import casadi_functions
 from hovi.errors import InputError, nearest, warn
+from hovi.planning.problem.goal_agreement import require_agreement
 from hovi.robot.robot import Robot
 from hovi.robot.space.orientation import ORIENTATIONS, rotation_from
 from hovi.robot.space.tangent import Symbols, hessian, jacobian
+from hovi.robot.tip_frame import moves_frame
 from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
+Mask = npt.NDArray[np.bool_]
 Owner = TypeVar("Owner")
 
 KEPT = 8
 """Number of configurations at which the equations of a frame goal are kept."""
 MAX_ANGLE_ERROR = 1e-6
 """Angle in [rad] above which a frame whose equations hold is half a turn away from its goal."""
+PROBES = 3
+"""Number of random configurations at which equations of goals are looked at for dependent ones."""
+DEPENDENT = 1e-9
+"""Length of what a row adds to those before it that counts as nothing, relative to all rows."""
 _TURNS = ("rotation", *ORIENTATIONS, "axis")
 """What a frame goal says of its orientation: one of them at most."""
 _OTHER_POSES = {
@@ -83,6 +92,7 @@ class FrameGoal:
     free_velocity: joints whose velocity at the goal is free, by name or ALL; the others are at
         rest.
     guess: configuration (nq,) from which inverse kinematics starts.
+    also: goals of other frames that are reached at the same time, as in a list of goals.
     Whatever was given, `position`, `rotation` and `axis` hold the goal.
     Raises InputError for a matrix that is no rotation, an axis or a quaternion without length, an
     argument of another name, or an empty goal.
@@ -98,6 +108,7 @@ class FrameGoal:
     quaternion_wxyz: npt.ArrayLike | None = field(default=None, kw_only=True)
     free_velocity: Sequence[str] = field(default=(), kw_only=True)
     guess: npt.ArrayLike | None = field(default=None, kw_only=True)
+    also: Sequence[FrameGoal] = field(default=(), kw_only=True)
 
     def __post_init__(self) -> None:
         turned = [name for name in _TURNS if getattr(self, name) is not None]
@@ -137,10 +148,44 @@ class FrameGoal:
             object.__setattr__(self, "axis", _axis(self.axis))
         if isinstance(self.free_velocity, str):
             object.__setattr__(self, "free_velocity", (self.free_velocity,))
+        if self.also:
+            self._take_over_others()
+
+    def _take_over_others(self) -> None:
+        """Set what is common to all goals: velocities that are free, and a guess."""
+        require_goals(self.also)
+        others = tuple(part for each in self.also for part in each.parts)
+        free = dict.fromkeys(joint for each in (self, *others) for joint in each.free_velocity)
+        guesses = [each.guess for each in (self, *others) if each.guess is not None]
+        object.__setattr__(self, "also", others)
+        object.__setattr__(self, "free_velocity", tuple(free))
+        object.__setattr__(self, "guess", guesses[0] if guesses else None)
+
+    @property
+    def parts(self) -> tuple[FrameGoal, ...]:
+        """The goals of all frames, of which each is looked at for its own frame alone."""
+        return (self, *self.also)
+
+    def moves(self, robot: Robot) -> Mask:
+        """Which entries of v move one of the frames, (nv,)."""
+        masks = [moves_frame(robot.model, each.frame) for each in self.parts]
+        return np.asarray(np.any(masks, axis=0))
+
+    @property
+    def frames(self) -> str:
+        """The frames in words, such as "frame 'tool0'"."""
+        names = [repr(each.frame) for each in self.parts]
+        return f"frame{'s' * (len(names) > 1)} {' and '.join(names)}"
 
     def check(self, robot: Robot) -> None:
-        """Raise InputError for a frame that the robot does not have, or that no joint moves."""
-        robot.check_frame_moves(self.frame)
+        """Raise InputError for frames that the robot does not have, or that no joint moves.
+
+        Also for goals of frames of one link that contradict each other.
+        """
+        for each in self.parts:
+            robot.check_frame_moves(each.frame)
+        for one, other in itertools.combinations(self.parts, 2):
+            require_agreement(robot, one, other)
 
     def difference(self, robot: Robot) -> PoseDifference:
         """The goal as a function c(q) that vanishes where it is reached."""
@@ -163,11 +208,19 @@ class FrameGoal:
     @property
     def equations(self) -> int:
         """Number of equations: 3 for a position, 3 for a rotation, 2 for an axis."""
-        turn = 3 if self.rotation is not None else 2 if self.axis is not None else 0
-        return (3 if self.position is not None else 0) + turn
+        turns = [3 if x.rotation is not None else 2 * (x.axis is not None) for x in self.parts]
+        return sum(turns) + 3 * sum(each.position is not None for each in self.parts)
 
     def miss(self, robot: Robot, q: Array) -> tuple[float, float]:
-        """Distance in [m] and angle in [rad] of the frame at q (nq,); 0 for parts left free."""
+        """Distance in [m] and angle in [rad] of the frame at q (nq,); 0 for parts left free.
+
+        Of several frames, the largest ones.
+        """
+        found = [each._miss(robot, q) for each in self.parts]
+        return max(distance for distance, _ in found), max(angle for _, angle in found)
+
+    def _miss(self, robot: Robot, q: Array) -> tuple[float, float]:
+        """That of its own frame."""
         pose = robot.frame_pose(self.frame, q)
         R, p = pose[:3, :3], pose[:3, 3]
         distance = 0.0 if self.position is None else _norm(p - np.asarray(self.position))
@@ -181,7 +234,10 @@ class FrameGoal:
 
     def miss_in_words(self, robot: Robot, q: Array) -> str:
         """The distance and the angle by which the frame misses its goal at q (nq,)."""
-        distance, angle = self.miss(robot, q)
+        return ", ".join(each._miss_in_words(robot, q) for each in self.parts)
+
+    def _miss_in_words(self, robot: Robot, q: Array) -> str:
+        distance, angle = self._miss(robot, q)
         parts = [f"{distance:.3g} m"] * (self.position is not None)
         parts += [f"{angle:.3g} rad"] * (self.rotation is not None or self.axis is not None)
         return f"frame {self.frame!r} misses it by {' and '.join(parts)}"
@@ -194,10 +250,13 @@ class PoseDifference(Function):
     A rotation error by theta about a unit axis u gives sin(theta) u = sum_i R_i x R*_i / 2 over
     the columns; an axis gives its two components orthogonal to the target. Both also vanish at
     half a turn, which `is_spurious` detects.
+
+    left_out: rows that follow from those before them, by their numbers.
     """
 
     goal: FrameGoal
     robot: Robot
+    left_out: tuple[int, ...] = ()
 
     @property
     def needs(self) -> frozenset[str]:
@@ -207,7 +266,7 @@ class PoseDifference(Function):
     @property
     def size(self) -> int:
         """Number of equations."""
-        return self.goal.equations
+        return self.goal.equations - len(self.left_out)
 
     def values(self, at: Points) -> Array:
         """c, shape (P, size)."""
@@ -220,6 +279,18 @@ class PoseDifference(Function):
     def curvature(self, at: Points, weights: Array) -> Curvature:
         """sum_i weights_i d2 c_i."""
         return {("q", "q"): self._curvature(at.q, weights)[0]}
+
+    @property
+    def independent(self) -> PoseDifference:
+        """The same without rows that follow from those before them at every configuration."""
+        random, v = np.random.default_rng(0), np.zeros(self.robot.nv)
+        turned = [random.uniform(-1.0, 1.0, self.robot.nv) for _ in range(PROBES)]
+        slopes = [
+            linear(self, self.robot.integrate(self.robot.neutral(), x), v)[1][:, 0] for x in turned
+        ]
+        kept = {i for J in slopes for i in _independent_rows(J)}
+        follow = tuple(i for i in range(self.size) if i not in kept)
+        return replace(self, left_out=follow) if follow else self
 
     def is_spurious(self, at: Points) -> bool:
         """Whether the frame is half a turn away from its goal."""
@@ -240,10 +311,6 @@ class PoseDifference(Function):
         return lru_cache(maxsize=KEPT)(evaluated)
 
     @cached_property
-    def _placement(self) -> ca.Function:
-        return casadi_functions(self.robot.model).frame_placement(self.goal.frame)
-
-    @cached_property
     def _symbols(self) -> tuple[Symbols, ca.SX]:
         """(q, v, a, t) and c."""
         sizes = {"q": self.robot.nq, "v": self.robot.nv, "a": self.robot.nv, "t": 1}
@@ -251,15 +318,9 @@ class PoseDifference(Function):
         return (q, v, a, t), self._equations(q)
 
     def _equations(self, q: ca.SX) -> ca.SX:
-        R, p = self._placement(q)
-        rows = []
-        if self.goal.position is not None:
-            rows.append(p - ca.DM(np.asarray(self.goal.position)))
-        if self.goal.rotation is not None:
-            rows.append(rotation_rows(R, np.asarray(self.goal.rotation)))
-        if self.goal.directions is not None:
-            rows.append(axis_rows(R, *self.goal.directions))
-        return ca.vertcat(*rows)
+        placed = casadi_functions(self.robot.model).frame_placement
+        rows = ca.vertcat(*(_rows(each, *placed(each.frame)(q)) for each in self.goal.parts))
+        return rows[[i for i in range(rows.shape[0]) if i not in self.left_out]]
 
     @cached_property
     def _linear(self) -> PointFunction:
@@ -273,6 +334,49 @@ class PoseDifference(Function):
         n, weights = self.robot.nv, ca.SX.sym("weights", c.shape[0])
         H = hessian(ca.dot(weights, c), symbols, self.robot.curved_space)[0][:n, :n]
         return PointFunction(ca.Function("ddc", [symbols[0], weights], [H]))
+
+
+def _independent_rows(J: Array) -> Iterator[int]:
+    """The rows of a matrix that do not follow from those before them."""
+    basis = np.zeros((0, J.shape[1]))
+    for i, row in enumerate(J):
+        rest = row - basis.T @ (basis @ row)
+        rest -= basis.T @ (basis @ rest)
+        size = np.linalg.norm(rest)
+        if size > DEPENDENT * np.linalg.norm(J):
+            basis = np.vstack([basis, rest / size])
+            yield i
+
+
+def all_of(goals: Sequence[FrameGoal]) -> FrameGoal:
+    """The goals of several frames as one, which is reached where all of them are.
+
+    Raises InputError for an empty list, and for entries of another kind.
+    """
+    require_goals(goals)
+    first, *others = goals
+    return replace(first, also=(*first.also, *others)) if others else first
+
+
+def require_goals(goals: Sequence[Any]) -> None:
+    """Raise InputError unless there is a goal, and all of them are of frames."""
+    if not goals or not all(isinstance(each, FrameGoal) for each in goals):
+        raise InputError(
+            "several goals at once are a list of hovi.FrameGoal, one for each frame, got "
+            f"{shown(goals)}."
+        )
+
+
+def _rows(goal: FrameGoal, R: ca.SX, p: ca.SX) -> ca.SX:
+    """The equations of one frame, with its axes R (3, 3) and its origin p (3,) in the world."""
+    rows = []
+    if goal.position is not None:
+        rows.append(p - ca.DM(np.asarray(goal.position)))
+    if goal.rotation is not None:
+        rows.append(rotation_rows(R, np.asarray(goal.rotation)))
+    if goal.directions is not None:
+        rows.append(axis_rows(R, *goal.directions))
+    return ca.vertcat(*rows)
 
 
 def _numbers(name: str, value: Any) -> Array:

@@ -16,7 +16,7 @@ from hovi.conditions.function import Function, linear
 from hovi.conditions.state_difference import StateDifference
 from hovi.discrete.state import ALL, State
 from hovi.errors import InputError
-from hovi.planning.problem.frame_goal import FrameGoal
+from hovi.planning.problem.frame_goal import FrameGoal, PoseDifference, all_of
 from hovi.planning.problem.inverse_kinematics import (
     InverseKinematicsResult,
     nearest_configuration,
@@ -25,7 +25,6 @@ from hovi.planning.problem.limits import Limits
 from hovi.planning.problem.presolve.frame_hints import hint_on_frame
 from hovi.robot.robot import Robot
 from hovi.robot.space.coordinates import Coordinates
-from hovi.robot.tip_frame import moves_frame
 from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
@@ -43,7 +42,7 @@ class Via:
 
     time: in [s]; a text such as "500 ms" is converted.
     goal: a State, whose velocity is free if none is given, or its configuration alone; or a
-        FrameGoal, which leaves all velocities free.
+        FrameGoal, or a list of them for several frames at once, which leaves all velocities free.
     Raises InputError for a time that is not positive, or another kind of goal.
     """
 
@@ -52,6 +51,8 @@ class Via:
     takes_turns: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
+        if isinstance(self.goal, list | tuple) and any(isinstance(x, FrameGoal) for x in self.goal):
+            object.__setattr__(self, "goal", all_of(self.goal))
         if isinstance(self.goal, np.ndarray | list | tuple):
             q = numbers_of("the goal of a via point", self.goal)
             object.__setattr__(self, "goal", State(q))
@@ -109,14 +110,15 @@ def goal_state(
         raise InputError(f"the {name} must be a State: {coordinates.owner} has no frames.")
     difference = _difference(coordinates, goal)  # which checks the frame
     reached = _solved_inverse_kinematics(coordinates, goal, near.tobytes(), limits)
-    moving = _moving_joints(coordinates, goal.frame, tuple(free))
+    moving = _moving_joints(coordinates, goal, tuple(free))
     state = State(reached.q, free=moving, free_velocity=tuple(goal.free_velocity))
     advice = f"move the {name} closer or give its FrameGoal a guess"
     reason = reached.reason and (
         f"no configuration that reaches the {name} was found: at the nearest, {reached.reason}; "
         f"{hint_on_frame(coordinates, goal) or advice}"
     )
-    return GoalState(state, (difference,), reason)
+    wanted = difference if reason else _independent(difference)
+    return GoalState(state, (wanted,), reason)
 
 
 def held_goal(goal: FrameGoal, robot: Robot, q: Array, free: Sequence[str] = ()) -> State | None:
@@ -126,21 +128,21 @@ def held_goal(goal: FrameGoal, robot: Robot, q: Array, free: Sequence[str] = ())
     """
     if max(goal.miss(robot, q)) > SATISFIED:
         return None
-    moves = moves_frame(robot.model, goal.frame)
+    moves = goal.moves(robot)
     left = tuple(each for each in free if each == ALL or not moves[robot.entries_of(each)].any())
     return None if ALL in left else State(q, free=left, free_velocity=tuple(goal.free_velocity))
 
 
 def is_isolated(goal: FrameGoal, robot: Robot, q: Array) -> bool:
     """Whether q, (nq,), alone satisfies a goal nearby: the goal's Jacobian has full column rank."""
-    moves = moves_frame(robot.model, goal.frame)
+    moves = goal.moves(robot)
     J = linear(_difference(robot, goal), q, np.zeros(robot.nv))[1][:, 0, moves]
     return bool(np.linalg.matrix_rank(J, tol=FULL_RANK * np.linalg.norm(J)) == moves.sum())
 
 
-def _moving_joints(robot: Robot, frame: str, free: tuple[str, ...]) -> tuple[str, ...]:
+def _moving_joints(robot: Robot, goal: FrameGoal, free: tuple[str, ...]) -> tuple[str, ...]:
     """The joints that are free at the goal of a frame: those that move it, and the given ones."""
-    moves = moves_frame(robot.model, frame)
+    moves = goal.moves(robot)
     if moves.all() or ALL in free:
         return (ALL,)
     own = (joint for joint in robot.joint_names if moves[robot.entries_of(joint)].any())
@@ -158,9 +160,14 @@ def via_differences(via: Via, reached: GoalState, coordinates: Coordinates) -> t
 
 
 @lru_cache(maxsize=256)
-def _difference(robot: Robot, goal: FrameGoal) -> Function:
+def _difference(robot: Robot, goal: FrameGoal) -> PoseDifference:
     """The difference from a goal, cached; robots and goals are immutable."""
     return goal.difference(robot)
+
+
+@lru_cache(maxsize=256)
+def _independent(difference: PoseDifference) -> PoseDifference:
+    return difference.independent
 
 
 @lru_cache(maxsize=256)

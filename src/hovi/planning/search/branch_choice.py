@@ -272,7 +272,7 @@ class _Choice:
             _Pair(start, q, number > 0)
             for branch in found
             for number, q in enumerate(
-                with_full_turns(robot, goal.frame, branch, near, self._bounds)
+                with_full_turns(robot, goal.moves(robot), branch, near, self._bounds)
             )
         ]
 

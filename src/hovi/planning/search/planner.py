@@ -111,7 +111,8 @@ def plan(
     scene: the robot with its effects.
     start, goal: a State, a configuration of shape (nq,) at rest, the name of a pose, or a
         FrameGoal; or a table of joint positions, or one with the keys of a scene file's [goal],
-        such as {"frame": "tool0", "position": [0.4, 0.2, 0.3]}.
+        such as {"frame": "tool0", "position": [0.4, 0.2, 0.3]}; a list of FrameGoals, or of their
+        tables, is for several frames at once.
     duration: T in [s], or a text such as "1.5 s", "500 ms" or "2 min"; or a pair (lower, upper)
         of these for a free duration.
     progress: called with a line of text and the completed fraction, in [0, 1]; in a notebook, a

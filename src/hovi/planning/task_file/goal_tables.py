@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -12,8 +12,8 @@ import pinocchio as pin
 from hovi.checks.units import seconds
 from hovi.discrete.grid import outside_motion
 from hovi.discrete.state import State
-from hovi.errors import HoviError, InputError
-from hovi.planning.problem.frame_goal import FrameGoal
+from hovi.errors import HoviError, InputError, SceneError
+from hovi.planning.problem.frame_goal import FrameGoal, all_of
 from hovi.planning.problem.goals import Via
 from hovi.planning.problem.notation.ends import END_KEYS, EndError, end_of
 from hovi.planning.problem.notation.via_points import require_no_rates
@@ -35,6 +35,33 @@ class Begin(NamedTuple):
 
 
 NO_GROUP = Begin()
+
+
+def read_goal(
+    goal: EndTable | Sequence[EndTable],
+    keys: Keys,
+    robot: Robot,
+    toml: TomlText,
+    begin: Begin = NO_GROUP,
+) -> State | FrameGoal:
+    """As `read_end`, or from the tables of several frames."""
+    if isinstance(goal, EndTable):
+        return read_end(goal, keys, robot, toml, begin)
+    found = list[FrameGoal]()
+    for number, table in enumerate(goal):
+        each = read_end(table, (*keys, number), robot, toml, begin)
+        if not isinstance(each, FrameGoal):
+            name = spelled((*keys, number))
+            raise toml.error(
+                (*keys, number), f"`{name}` needs a `frame`: several goals are of frames"
+            )
+        found.append(each)
+    try:
+        whole = all_of(found)
+        whole.check(robot)
+    except InputError as wrong:
+        raise toml.error(keys, str(wrong)) from None
+    return whole
 
 
 def read_end(
@@ -126,10 +153,25 @@ def _time(given: float | str, keys: Keys, toml: TomlText) -> float:
         raise toml.error(keys, str(wrong)) from None
 
 
+def goal_value(goal: State | FrameGoal, robot: Robot) -> dict[str, Any] | list[dict[str, Any]]:
+    """The table of a goal, or those of several frames."""
+    if isinstance(goal, State) or not goal.also:
+        return end_table(goal, robot, "goal")
+    alone = [replace(goal, also=(), free_velocity=()), *goal.also]
+    tables = [end_table(each, robot, "goal") for each in alone]
+    if goal.free_velocity:
+        tables[0]["free_velocity"] = list(goal.free_velocity)
+    return tables
+
+
 def end_table(goal: State | FrameGoal, robot: Robot, name: str) -> dict[str, Any]:
     """The table from which `read_end` reads a start or a goal. name: of it in messages."""
     if isinstance(goal, State):
         return state_table(goal, robot, name)
+    if goal.also:
+        raise SceneError(
+            f"scene files have one frame for each {name}: give goals of several frames to segments."
+        )
     table: dict[str, Any] = {"frame": goal.frame}
     if goal.position is not None:
         table["position"] = _floats(goal.position)

@@ -171,6 +171,8 @@ class GoalTable(EndTable):
 
 def _with_q(given: Any) -> Any:
     """The table of an end from a configuration that is given by itself, as Python takes it."""
+    if isinstance(given, list) and given and all(isinstance(each, dict) for each in given):
+        return given
     if isinstance(given, str | list):
         return {"q": given}
     by_joint = isinstance(given, dict) and given and not given.keys() & GoalTable.model_fields
@@ -183,13 +185,21 @@ def _listed(given: Any) -> Any:
 
 
 Start = Annotated[StartTable, BeforeValidator(_with_q)]
-Goal = Annotated[GoalTable | None, BeforeValidator(_with_q)]
+Goal = Annotated[
+    Annotated[
+        Annotated[GoalTable, Tag("<table>")] | Annotated[list[GoalTable], Tag("<list>")],
+        Discriminator(_kind),
+    ]
+    | None,
+    BeforeValidator(_with_q),
+]
 Bare = list[FiniteFloat] | dict[str, FiniteFloat | list[FiniteFloat]] | str
 """A configuration by itself in place of the table of an end."""
 _END = (
     "a list of finite numbers, a table of joint names, the name of a pose, or a table {} with q "
     "and, if moving, v, or with a frame and its target"
 )
+_FRAMES = "; or tables [{}], one for each of several frames at once"
 
 
 class ViaTable(GoalTable):
@@ -203,7 +213,10 @@ class SegmentTable(Table):
 
     name: str = Field(default="", description="a text")
     duration: PositiveDuration = Field(description=DURATION_IN_WORDS)
-    goal: Goal = Field(default=None, description=_END.format("[segments.goal]"))
+    goal: Goal = Field(
+        default=None,
+        description=(_END + _FRAMES).format("[segments.goal]", "[segments.goal]"),
+    )
     limits: Any = Field(
         default=None, description='"urdf", "soft", "none", the name of an arm or a table of limits'
     )
@@ -309,7 +322,7 @@ class ShapedTable(Table):
         default=[], description="tables [[keep]], or one table [keep], with a kind each"
     )
     start: Start = Field(description=_END.format("[start]"))
-    goal: Goal = Field(default=None, description=_END.format("[goal]"))
+    goal: Goal = Field(default=None, description=(_END + _FRAMES).format("[goal]", "[goal]"))
     segments: list[SegmentTable] = Field(
         default=[], description="tables [[segments]] with a duration and a goal each"
     )
