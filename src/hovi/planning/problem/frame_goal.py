@@ -24,7 +24,18 @@ from hovi.conditions.function import Curvature, Function, Points, Slopes, linear
 from hovi.dynamics.point_function import PointFunction
 from hovi.dynamics.symbolic_dynamics import casadi_functions
 from hovi.errors import InputError, nearest, warn
-from hovi.planning.problem.goal_agreement import require_agreement
+from hovi.planning.problem.goal_agreement import Target, require_agreement
+from hovi.planning.problem.goal_region import (
+    AXES,
+    Bound,
+    Side,
+    Within,
+    angle_of,
+    bounds_of,
+    held,
+    room_of,
+)
+from hovi.robot.model import frame_named
 from hovi.robot.robot import Robot
 from hovi.robot.space.orientation import ORIENTATIONS, rotation_from
 from hovi.robot.space.tangent import Symbols, hessian, jacobian
@@ -92,7 +103,13 @@ class FrameGoal:
     free_velocity: joints whose velocity at the goal is free, by name or ALL; the others are at
         rest.
     guess: configuration (nq,) from which inverse kinematics starts.
+    within: the region around `position` in which the frame may end, wherever the motion costs
+        least: the radius of a ball, in [m] or as a text such as "10 mm"; or half of the three edges
+        of a box, along the axes of the world, 0 where the position is exact.
+    within_angle: the largest angle from the rotation or the axis, in [rad] or as "5 deg".
+    box_frame: the frame along whose axes the box is; the world by default.
     also: goals of other frames that are reached at the same time, as in a list of goals.
+    sides: where the bounds of the region are held, as a plan finds them; at the middle by default.
     Whatever was given, `position`, `rotation` and `axis` hold the goal.
     Raises InputError for a matrix that is no rotation, an axis or a quaternion without length, an
     argument of another name, or an empty goal.
@@ -108,7 +125,11 @@ class FrameGoal:
     quaternion_wxyz: npt.ArrayLike | None = field(default=None, kw_only=True)
     free_velocity: Sequence[str] = field(default=(), kw_only=True)
     guess: npt.ArrayLike | None = field(default=None, kw_only=True)
+    within: Within | None = field(default=None, kw_only=True)
+    within_angle: float | str | None = field(default=None, kw_only=True)
+    box_frame: str | None = field(default=None, kw_only=True)
     also: Sequence[FrameGoal] = field(default=(), kw_only=True)
+    sides: Sequence[Side] = field(default=(), kw_only=True, repr=False)
 
     def __post_init__(self) -> None:
         turned = [name for name in _TURNS if getattr(self, name) is not None]
@@ -148,8 +169,48 @@ class FrameGoal:
             object.__setattr__(self, "axis", _axis(self.axis))
         if isinstance(self.free_velocity, str):
             object.__setattr__(self, "free_velocity", (self.free_velocity,))
+        self._check_region()
         if self.also:
             self._take_over_others()
+
+    def _check_region(self) -> None:
+        """Raise InputError for a region of nothing, and for bounds that are none."""
+        for name, of, given in (
+            ("within", "a position", self.position is not None),
+            ("within_angle", "a rotation or an axis", bool(self._turn_equations)),
+        ):
+            if getattr(self, name) is not None and not given:
+                raise InputError(f"`{name}` of a frame goal is around {of}: give one, too.")
+        if self.box_frame is not None and len(self._room or ()) != len(AXES):
+            raise InputError(
+                "`box_frame` of a frame goal needs a box: give `within` three lengths."
+            )
+        _ = self.bounds
+
+    @cached_property
+    def bounds(self) -> tuple[Bound, ...]:
+        """The bounds of the region of its own frame, in the order of its equations."""
+        angle = None if self.within_angle is None else angle_of(self.within_angle)
+        position = 0 if self.position is None else len(AXES)
+        return tuple(bounds_of(self._room, angle, position, self._turn_equations))
+
+    @property
+    def _room(self) -> tuple[float, ...] | None:
+        return None if self.within is None else room_of(self.within)
+
+    @property
+    def _turn_equations(self) -> int:
+        return 3 if self.rotation is not None else 2 if self.axis is not None else 0
+
+    @property
+    def regional(self) -> bool:
+        """Whether a frame has a region."""
+        return any(each.bounds for each in self.parts)
+
+    @property
+    def middle(self) -> FrameGoal:
+        """The same with all bounds held at their middle."""
+        return replace(self, sides=(), also=[replace(each, sides=()) for each in self.also])
 
     def _take_over_others(self) -> None:
         """Set what is common to all goals: velocities that are free, and a guess."""
@@ -165,6 +226,11 @@ class FrameGoal:
     def parts(self) -> tuple[FrameGoal, ...]:
         """The goals of all frames, of which each is looked at for its own frame alone."""
         return (self, *self.also)
+
+    @property
+    def alone(self) -> FrameGoal:
+        """That of its own frame."""
+        return replace(self, also=()) if self.also else self
 
     def moves(self, robot: Robot) -> Mask:
         """Which entries of v move one of the frames, (nv,)."""
@@ -184,7 +250,11 @@ class FrameGoal:
         """
         for each in self.parts:
             robot.check_frame_moves(each.frame)
-        for one, other in itertools.combinations(self.parts, 2):
+            if each.box_frame is not None:
+                frame_named(robot.model, each.box_frame)
+        exact = [x for x in self.parts if not x.bounds]  # regions may overlap
+        targets = [Target(x.frame, x.position, x.rotation, x.directions) for x in exact]
+        for one, other in itertools.combinations(targets, 2):
             require_agreement(robot, one, other)
 
     def difference(self, robot: Robot) -> PoseDifference:
@@ -208,29 +278,45 @@ class FrameGoal:
     @property
     def equations(self) -> int:
         """Number of equations: 3 for a position, 3 for a rotation, 2 for an axis."""
-        turns = [3 if x.rotation is not None else 2 * (x.axis is not None) for x in self.parts]
-        return sum(turns) + 3 * sum(each.position is not None for each in self.parts)
+        return sum(x._turn_equations + 3 * (x.position is not None) for x in self.parts)
 
     def miss(self, robot: Robot, q: Array) -> tuple[float, float]:
         """Distance in [m] and angle in [rad] of the frame at q (nq,); 0 for parts left free.
 
-        Of several frames, the largest ones.
+        From the region if there is one. Of several frames, the largest ones.
         """
         found = [each._miss(robot, q) for each in self.parts]
         return max(distance for distance, _ in found), max(angle for _, angle in found)
 
     def _miss(self, robot: Robot, q: Array) -> tuple[float, float]:
         """That of its own frame."""
+        (offset, angle), room = self.off(robot, q), self._room
+        if room is None:
+            distance = _norm(offset)
+        elif len(room) == 1:
+            distance = max(0.0, _norm(offset) - room[0])
+        else:
+            distance = _norm(np.maximum(np.abs(offset) - room, 0.0))
+        least = 0.0 if self.within_angle is None else angle_of(self.within_angle)
+        return distance, max(0.0, angle - least)
+
+    def off(self, robot: Robot, q: Array) -> tuple[Array, float]:
+        """The offset of its own frame at q (nq,), in [m] along the box, and the angle in [rad].
+
+        0 for what is left free.
+        """
         pose = robot.frame_pose(self.frame, q)
         R, p = pose[:3, :3], pose[:3, 3]
-        distance = 0.0 if self.position is None else _norm(p - np.asarray(self.position))
+        offset = np.zeros(3) if self.position is None else p - np.asarray(self.position)
+        if self.box_frame is not None:
+            offset = robot.frame_pose(self.box_frame, q)[:3, :3].T @ offset
         angle = 0.0
         if self.rotation is not None:
             angle = _norm(pin.log3(np.asarray(self.rotation).T @ R))
         if self.directions is not None:
             inner, world = self.directions
             angle = float(np.arctan2(_norm(np.cross(R @ inner, world)), (R @ inner) @ world))
-        return distance, angle
+        return offset, angle
 
     def miss_in_words(self, robot: Robot, q: Array) -> str:
         """The distance and the angle by which the frame misses its goal at q (nq,)."""
@@ -266,7 +352,7 @@ class PoseDifference(Function):
     @property
     def size(self) -> int:
         """Number of equations."""
-        return self.goal.equations - len(self.left_out)
+        return int(self._symbols[1].shape[0])
 
     def values(self, at: Points) -> Array:
         """c, shape (P, size)."""
@@ -319,7 +405,11 @@ class PoseDifference(Function):
 
     def _equations(self, q: ca.SX) -> ca.SX:
         placed = casadi_functions(self.robot.model).frame_placement
-        rows = ca.vertcat(*(_rows(each, *placed(each.frame)(q)) for each in self.goal.parts))
+        found = list[ca.SX]()
+        for each in self.goal.parts:
+            box = None if each.box_frame is None else placed(each.box_frame)(q)[0]
+            found.append(_rows(each, *placed(each.frame)(q), box))
+        rows = ca.vertcat(*found)
         return rows[[i for i in range(rows.shape[0]) if i not in self.left_out]]
 
     @cached_property
@@ -367,16 +457,24 @@ def require_goals(goals: Sequence[Any]) -> None:
         )
 
 
-def _rows(goal: FrameGoal, R: ca.SX, p: ca.SX) -> ca.SX:
-    """The equations of one frame, with its axes R (3, 3) and its origin p (3,) in the world."""
-    rows = []
+def _rows(goal: FrameGoal, R: ca.SX, p: ca.SX, box: ca.SX | None) -> ca.SX:
+    """The equations of one frame, with its axes R (3, 3) and its origin p (3,) in the world.
+
+    box: the axes of a box; None for those of the world.
+    """
+    rows, turn = [], ca.SX(0.0)
     if goal.position is not None:
-        rows.append(p - ca.DM(np.asarray(goal.position)))
+        offset = p - ca.DM(np.asarray(goal.position))
+        rows.append(offset if box is None else box.T @ offset)
     if goal.rotation is not None:
-        rows.append(rotation_rows(R, np.asarray(goal.rotation)))
+        target = np.asarray(goal.rotation)
+        rows.append(rotation_rows(R, target))
+        turn = (3.0 - ca.trace(ca.DM(target.T) @ R)) / 2.0
     if goal.directions is not None:
-        rows.append(axis_rows(R, *goal.directions))
-    return ca.vertcat(*rows)
+        inner, world = goal.directions
+        rows.append(axis_rows(R, inner, world))
+        turn = 1.0 - ca.dot(ca.DM(world), R @ ca.DM(inner))
+    return held(ca.vertcat(*rows), turn, goal.bounds, goal.sides)
 
 
 def _numbers(name: str, value: Any) -> Array:

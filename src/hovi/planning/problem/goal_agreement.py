@@ -7,7 +7,7 @@ has R v = w for all of them, the best of which is Wahba's.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -16,16 +16,22 @@ from hovi.errors import InputError
 from hovi.robot.model import frame_named
 from hovi.robot.robot import Robot
 
-if TYPE_CHECKING:
-    from hovi.planning.problem.frame_goal import FrameGoal
-
 Array = npt.NDArray[np.float64]
 
 AGREEMENT = 1e-6
 """Largest |R v - w| of goals that agree, in [m] or [rad]."""
 
 
-def require_agreement(robot: Robot, one: FrameGoal, other: FrameGoal) -> None:
+class Target(NamedTuple):
+    """What a goal says of a frame: its position, its rotation or a direction, where it has them."""
+
+    frame: str
+    position: npt.ArrayLike | None
+    rotation: npt.ArrayLike | None
+    directions: tuple[Array, Array] | None
+
+
+def require_agreement(robot: Robot, one: Target, other: Target) -> None:
     """Raise InputError for goals of two frames of one link that contradict each other."""
     first, second = (frame_named(robot.model, each.frame) for each in (one, other))
     if first.parentJoint != second.parentJoint:
@@ -46,7 +52,7 @@ def require_agreement(robot: Robot, one: FrameGoal, other: FrameGoal) -> None:
         )
 
 
-def _directions(goal: FrameGoal, R: Array) -> list[tuple[Array, Array]]:
+def _directions(goal: Target, R: Array) -> list[tuple[Array, Array]]:
     """The directions that a goal gives, in the axes of the link and in the world.
 
     R: of the goal's frame in the axes of the link.

@@ -25,9 +25,9 @@ POINT = coal.Sphere(0.0)
 def goal_distances(goal: FrameGoal, distances: Distances) -> dict[Pair, float]:
     """Upper bounds of the distances of the goal's link from obstacles, in [m], by pair.
 
-    Exact for a pose, a bound for a position, none for a goal without a position; of its own frame.
+    Of its own frame: exact for a pose, a bound for a position, none for others and for regions.
     """
-    if goal.position is None:
+    if goal.position is None or goal.bounds:
         return {}
     frame = frame_named(distances.robot.model, goal.frame)
     at = np.asarray(goal.position, dtype=float)

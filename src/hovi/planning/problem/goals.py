@@ -49,6 +49,7 @@ class Via:
     time: float
     goal: State | FrameGoal
     takes_turns: ClassVar[bool] = False
+    takes_regions: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         if isinstance(self.goal, list | tuple) and any(isinstance(x, FrameGoal) for x in self.goal):
@@ -66,6 +67,10 @@ class Via:
             raise InputError(f"the time of a via point must be positive, got {self.time} s.")
         if isinstance(self.goal, State) and self.goal.turns and not self.takes_turns:
             raise InputError("a via point takes no `turns`: set them on the goal.")
+        if isinstance(self.goal, FrameGoal) and self.goal.regional and not self.takes_regions:
+            raise InputError(
+                "a via point takes no region: leave `within` out, or make it the goal of a segment."
+            )
         rates = ("a", "free_acceleration", "jerk", "free_jerk")
         given = [key for key in rates if _is_given(getattr(self.goal, key, None))]
         if given:
@@ -122,11 +127,11 @@ def goal_state(
 
 
 def held_goal(goal: FrameGoal, robot: Robot, q: Array, free: Sequence[str] = ()) -> State | None:
-    """The state at q, (nq,), that satisfies a goal of a frame; None if q does not.
+    """The state at q, (nq,), that satisfies a goal of a frame; None if q does not, or in a region.
 
     free: joints that are free in it if they do not move the frame.
     """
-    if max(goal.miss(robot, q)) > SATISFIED:
+    if goal.regional or max(goal.miss(robot, q)) > SATISFIED:
         return None
     moves = goal.moves(robot)
     left = tuple(each for each in free if each == ALL or not moves[robot.entries_of(each)].any())
@@ -135,6 +140,8 @@ def held_goal(goal: FrameGoal, robot: Robot, q: Array, free: Sequence[str] = ())
 
 def is_isolated(goal: FrameGoal, robot: Robot, q: Array) -> bool:
     """Whether q, (nq,), alone satisfies a goal nearby: the goal's Jacobian has full column rank."""
+    if goal.regional:
+        return False
     moves = goal.moves(robot)
     J = linear(_difference(robot, goal), q, np.zeros(robot.nv))[1][:, 0, moves]
     return bool(np.linalg.matrix_rank(J, tol=FULL_RANK * np.linalg.norm(J)) == moves.sum())

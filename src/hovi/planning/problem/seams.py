@@ -35,6 +35,7 @@ class Seam(Via):
 
     unreachable: str = ""
     takes_turns: ClassVar[bool] = True
+    takes_regions: ClassVar[bool] = True
 
 
 @dataclass(frozen=True, eq=False)

@@ -138,10 +138,33 @@ def plan(
         scene, start_end, goal_end = in_group(scene, options.group, *given)
         given = start_end, goal_end
     length = as_duration(duration)
-    planned = functools.partial(_planned, options.aiming(scene), *given, length, progress)
+    whole = functools.partial(_planned, options.aiming(scene))
+    planned = functools.partial(_settled, whole, *given, length, progress)
     if options.objective == "time":
         return least_duration(planned, length, options)
     return planned(options, began)
+
+
+def _settled(
+    planned: Callable[..., Solution],
+    start: State | FrameGoal,
+    goal: State | FrameGoal,
+    duration: float | tuple[float, float],
+    progress: Progress | None,
+    options: PlanOptions,
+    began: float | None = None,
+) -> Solution:
+    """The plan to a goal, whose region is settled if it has one. planned: see `_planned`."""
+    found = planned(start, goal, duration, progress, options, began)
+    if not (isinstance(goal, FrameGoal) and goal.regional):
+        return found
+    from hovi.planning.search.settled_regions import moved_to, settled  # most goals are exact
+
+    def again(goals: Sequence[FrameGoal], last: Solution) -> Solution:
+        begun = options.with_changes(guess=moved_to(goals, last), starts=1)
+        return planned(last.problem.start, goals[0], duration, progress, begun)
+
+    return settled(found, again)
 
 
 def _planned(

@@ -180,6 +180,9 @@ def end_table(goal: State | FrameGoal, robot: Robot, name: str) -> dict[str, Any
     if goal.directions is not None:
         inner, world = goal.directions
         table["axis"] = {"frame": _floats(inner), "world": _floats(world)}
+    for key in ("within", "within_angle", "box_frame"):
+        if getattr(goal, key) is not None:
+            table[key] = _plain(getattr(goal, key))
     if goal.free_velocity:
         table["free_velocity"] = list(goal.free_velocity)
     return table
@@ -210,6 +213,13 @@ def state_table(state: State, robot: Robot, name: str) -> dict[str, Any]:
         turns = {joint: np.asarray(x, dtype=float).tolist() for joint, x in state.turns.items()}
         table["turns"] = turns
     return table
+
+
+def _plain(value: Any) -> Any:
+    """A number, a text or a list of both, as TOML takes them."""
+    if isinstance(value, list | tuple | np.ndarray):
+        return [_plain(each) for each in value]
+    return value if isinstance(value, str) else float(value)
 
 
 def _floats(values: Any) -> list[float]:

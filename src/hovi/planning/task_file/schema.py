@@ -155,6 +155,9 @@ class EndTable(Table):
     axis: AxisTable | None = Field(
         default=None, description="a table with two directions, `frame` and `world`"
     )
+    within: Any = Field(default=None, description='a length, such as "10 mm", or a list of three')
+    within_angle: Any = Field(default=None, description='an angle, such as "5 deg"')
+    box_frame: str | None = Field(default=None, description="the name of a frame of the robot")
 
 
 class StartTable(EndTable):

@@ -75,8 +75,10 @@ def find_branches(
     """
     raise_if_late()
     near = inside(robot, near, *bounds)
+    if any(each.sides for each in goal.parts) and max(goal.miss(robot, near)) <= PYTHON_TOLERANCE:
+        return Branches(near[None], near)  # where a plan before ended
     if goal.also:
-        return _of_several(robot, goal, near, bounds, most, seeds)
+        return _of_several(robot, goal.middle, near, bounds, most, seeds)
     lower, upper = bounds
     compiled = _compiled(robot, goal.frame, lower.tobytes(), upper.tobytes())
     if compiled is None:
@@ -98,7 +100,8 @@ def find_branches(
         best=best,
     )
     q = chain.configurations(np.vstack([found[:count], best]), near)
-    return Branches(q[:-1], q[-1])
+    within = count == 0 and goal.regional and max(goal.miss(robot, q[-1])) == 0.0
+    return Branches(q if within else q[:-1], q[-1])
 
 
 def _of_several(
@@ -113,10 +116,10 @@ def _of_several(
     moves: Array = np.zeros((1, robot.nv))
     for parts in _apart(robot, goal.parts):
         if len(parts) == 1:
-            alone = replace(parts[0], also=())
+            alone = parts[0].alone
             found = find_branches(robot, alone, near, bounds, most, seeds)
         else:
-            each = (replace(part, also=()) for part in parts)
+            each = (part.alone for part in parts)
             known = [q for x in each for q in find_branches(robot, x, near, bounds, most, seeds).q]
             together = replace(parts[0], also=parts[1:])
             found = _in_python(robot, together, near, bounds, most, seeds, known)

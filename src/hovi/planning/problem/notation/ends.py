@@ -20,7 +20,10 @@ Frames = Sequence[FrameGoal | Mapping[str, Any]]
 End = State | FrameGoal | Frames | npt.ArrayLike | str | Mapping[str, Any]
 """A start or a goal as it may be given."""
 
-FRAME_KEYS = ("pose", "position", "rotation", *ORIENTATIONS, "axis", "guess")
+FRAME_KEYS = (
+    *("pose", "position", "rotation", *ORIENTATIONS, "axis", "guess"),
+    *("within", "within_angle", "box_frame"),
+)
 """Keys of a table that belong to a frame's target; free_velocity belongs to both."""
 STATE_KEYS = ("q", "v", "a", "free", "free_acceleration", "turns")
 """Keys of a table that belong to a state."""

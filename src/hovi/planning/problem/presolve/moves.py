@@ -192,7 +192,7 @@ class _FrameMove(Move):
         goal = self._other.goal
         assert isinstance(goal, FrameGoal)
         q, held = self.known.position(robot)
-        if not held[goal.moves(robot)].all():
+        if goal.regional or not held[goal.moves(robot)].all():
             return None
         bounds = self.limits.lower[0], self.limits.upper[0]
         found = find_branches(robot, goal, q, bounds, BRANCHES, SEEDS).q
