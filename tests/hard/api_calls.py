@@ -514,6 +514,11 @@ def _problems() -> list[Call]:
         build(hovi.FrameGoal, frame="tip", axis={"frame": [1, 0, 0], "world": [0, 0, 1]}),
         build(hovi.FrameGoal, frame="tip", pose=np.eye(4)),
         build(hovi.FrameGoal, frame="tip", position=[0.2, 0.0, 0.0], also=[frame_goal]),
+        build(
+            hovi.FrameGoal,
+            **{"frame": "tip", "position": [0.2, 0.0, 0.0], "within": ["10 mm", 0.0, 0.02]},
+            **{"axis": ([1, 0, 0], [0, 0, 1]), "within_angle": "5 deg", "box_frame": "forearm"},
+        ),
         build(hovi.FrameGoal, frame="tip", rpy=[0.1, 0.2, 0.3]),
         build(hovi.FrameGoal, frame="tip", quaternion_xyzw=[0.0, 0.0, 0.0, 1.0]),
         build(hovi.FrameGoal, frame="tip", quaternion_wxyz=[1.0, 0.0, 0.0, 0.0]),

@@ -392,7 +392,7 @@ class PoseDifference(Function):
 
         def evaluated(numbers: bytes) -> tuple[Array, Array]:
             c, J = self._linear(np.frombuffer(numbers)[None])
-            return c[0], J.reshape(self.size, -1)
+            return c[0], J.reshape(self.size, self.robot.nv)
 
         return lru_cache(maxsize=KEPT)(evaluated)
 
@@ -408,7 +408,8 @@ class PoseDifference(Function):
         found = list[ca.SX]()
         for each in self.goal.parts:
             box = None if each.box_frame is None else placed(each.box_frame)(q)[0]
-            found.append(_rows(each, *placed(each.frame)(q), box))
+            R, p = placed(each.frame)(q)
+            found.append(_rows(each, R, p, box))
         rows = ca.vertcat(*found)
         return rows[[i for i in range(rows.shape[0]) if i not in self.left_out]]
 

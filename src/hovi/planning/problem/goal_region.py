@@ -66,10 +66,10 @@ class Bound:
     def edge(self, middle: ca.SX, turn: ca.SX, side: Side) -> ca.SX:
         """The equation at its edge. middle: those at its middle. turn: 1 - cos of the angle."""
         if self.of_angle:
-            return (turn - (1.0 - np.cos(self.room))) / np.sin(self.room)
+            return ca.SX((turn - (1.0 - np.cos(self.room))) / np.sin(self.room))
         if self.size == 1:
-            return middle - (self.room if side is Side.HIGH else -self.room)
-        return ca.sumsqr(middle) / (2.0 * self.room) - self.room / 2.0
+            return ca.SX(middle - (self.room if side is Side.HIGH else -self.room))
+        return ca.SX(ca.sumsqr(middle) / (2.0 * self.room) - self.room / 2.0)
 
 
 def room_of(within: Any) -> tuple[float, ...]:

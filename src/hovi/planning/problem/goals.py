@@ -123,7 +123,7 @@ def goal_state(
         f"{hint_on_frame(coordinates, goal) or advice}"
     )
     wanted = difference if reason else _independent(difference)
-    return GoalState(state, (wanted,), reason)
+    return GoalState(state, (wanted,) if wanted.size > 0 else (), reason)
 
 
 def held_goal(goal: FrameGoal, robot: Robot, q: Array, free: Sequence[str] = ()) -> State | None:

@@ -107,7 +107,7 @@ def _poses(
 
     def pose(frame: str) -> Pose:
         for part in end.parts if isinstance(end, FrameGoal) else ():
-            if part.frame == frame:
+            if part.frame == frame and not (part.bounds and name == "start"):
                 given = part.rotation, part.position
                 return Pose(*(None if each is None else np.asarray(each) for each in given))
         if isinstance(end, State) and not end.free:

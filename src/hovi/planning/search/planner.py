@@ -22,7 +22,7 @@ from hovi.planning.clearance.self_collisions import not_looked_at, pairs_left_ou
 from hovi.planning.problem.clock import Clock
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.goals import Via
-from hovi.planning.problem.notation.ends import End, as_end
+from hovi.planning.problem.notation.ends import End, as_end, as_start
 from hovi.planning.problem.notation.goal_turns import says_turns, turns_sentence
 from hovi.planning.problem.notation.smoothing import smoothed
 from hovi.planning.problem.presolve.assumptions import assumptions
@@ -131,22 +131,21 @@ def plan(
     expect(options, PlanOptions, "hovi.PlanOptions(...), or its fields by keyword")
     options = options.with_changes(**changes)
     scene = options.holding(scene)
-    first = as_end(start, scene.robot, "start")
+    first = as_start(start, scene.robot)
     goal = with_others(goal, options.group, scene.robot, first)
     given = first, _goal(goal, scene.robot, options)
     if options.group is not None:
         scene, start_end, goal_end = in_group(scene, options.group, *given)
         given = start_end, goal_end
     length = as_duration(duration)
-    whole = functools.partial(_planned, options.aiming(scene))
-    planned = functools.partial(_settled, whole, *given, length, progress)
+    planned = functools.partial(_settled, options.aiming(scene), *given, length, progress)
     if options.objective == "time":
         return least_duration(planned, length, options)
     return planned(options, began)
 
 
 def _settled(
-    planned: Callable[..., Solution],
+    scene: Scene,
     start: State | FrameGoal,
     goal: State | FrameGoal,
     duration: float | tuple[float, float],
@@ -154,15 +153,19 @@ def _settled(
     options: PlanOptions,
     began: float | None = None,
 ) -> Solution:
-    """The plan to a goal, whose region is settled if it has one. planned: see `_planned`."""
-    found = planned(start, goal, duration, progress, options, began)
+    """As `_planned`, with the region of the goal settled if it has one."""
+    planned = functools.partial(_planned, scene)
     if not (isinstance(goal, FrameGoal) and goal.regional):
-        return found
-    from hovi.planning.search.settled_regions import moved_to, settled  # most goals are exact
+        return planned(start, goal, duration, progress, options, began)
+    from hovi.planning.search.settled_regions import begun, moved_to, settled  # most are exact
+
+    goal = begun(goal, start, scene, options)
+    found = planned(start, goal, duration, progress, options, began)
 
     def again(goals: Sequence[FrameGoal], last: Solution) -> Solution:
-        begun = options.with_changes(guess=moved_to(goals, last), starts=1)
-        return planned(last.problem.start, goals[0], duration, progress, begun)
+        assert last.problem is not None
+        near = moved_to(goals, last)
+        return planned(last.problem.start, goals[0], duration, progress, options, None, near)
 
     return settled(found, again)
 
@@ -175,10 +178,12 @@ def _planned(
     progress: Progress | None,
     options: PlanOptions,
     began: float | None = None,
+    near: Trajectory | None = None,
 ) -> Solution:
     """The motion in a scene whose robot holds what is grasped, with the effects of the objective.
 
-    began: when the plan did, by the clock; now by default.
+    began: when the plan did, by the clock; now by default. near: a motion of a similar plan, from
+    which it begins in place of the guess.
     """
     began = time.perf_counter() if began is None else began
     if options.keep:
@@ -187,7 +192,9 @@ def _planned(
         options, goal = with_kept(options, scene.robot, start, goal, duration)
     given = start, goal
     chosen, apart = kept_apart(options.on(scene), scene.robot, ends_of(*given, options.via))
-    deadline = Deadline(chosen.time_limit_seconds)
+    deadline, guess = Deadline(chosen.time_limit_seconds), chosen.guess
+    if near is not None:
+        chosen = chosen.with_changes(guess=near, starts=1)
     free, T = _time(duration, chosen)
     planning = _Planning(scene, *given, T, chosen, free)
     job = planning.job(nearest_ends(scene, *given, chosen), deadline)
@@ -208,7 +215,8 @@ def _planned(
     search = planning.search(job, deadline, progress or silent)
     reason = "" if search.ends is None else search.ends.reason
     found = infeasible_at_once(longest, chosen.guess, reason) if reason else search.run(began)
-    return with_notes(found, [search.fine.scene], search.fine.options, apart)
+    options = search.fine.options.with_changes(guess=guess)
+    return with_notes(found, [search.fine.scene], options, apart)
 
 
 def _says_the_same(job: Job, free: FreeDuration | None, reason: str) -> bool:

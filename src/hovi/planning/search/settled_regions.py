@@ -5,16 +5,30 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Sequence
 
+import numpy as np
+
+from hovi.discrete.state import State
 from hovi.discrete.trajectory import Trajectory
 from hovi.planning.problem.frame_goal import FrameGoal
+from hovi.planning.problem.goals import SATISFIED
+from hovi.planning.problem.inverse_kinematics import (
+    SEEDS,
+    first_configuration,
+    position_bounds,
+)
+from hovi.planning.problem.kinematics.branches import find_branches
+from hovi.planning.search.continuation import STOPPED
+from hovi.planning.search.options import PlanOptions
 from hovi.planning.solver.regions import (
     ends_inside,
-    inside_all,
+    freed,
+    inside,
     region_goals,
     region_prices,
     with_next_sides,
 )
 from hovi.planning.solver.solver import Solution
+from hovi.scene.scene import Scene
 
 MOST_PLANS = 12
 """Largest number of plans for one set of regions."""
@@ -30,7 +44,7 @@ def settled(found: Solution, again: Again) -> Solution:
     if found.problem is None or not region_goals(found.problem):
         return found
     if not found.success:
-        other = again(inside_all(found), found)
+        other = again(inside(found), found)
         found = other if other.success else found
     best, steps = found, found.nit
     for _ in range(MOST_PLANS):
@@ -42,9 +56,29 @@ def settled(found: Solution, again: Again) -> Solution:
         assert problem is not None
         if all(a is b for a, b in zip(goals, region_goals(problem), strict=True)):
             return _saying(dataclasses.replace(found, nit=steps))
-        found = again(goals, found)
+        last, found = found, again(goals, found)
         steps += found.nit
+        if not found.success and found.status not in STOPPED:  # an edge may be out of reach
+            found = again(inside(last, goals), last)
+            steps += found.nit
     return _unsettled(best, steps)
+
+
+def begun(
+    goal: FrameGoal, start: State | FrameGoal, scene: Scene, options: PlanOptions
+) -> FrameGoal:
+    """The goal, with no bounds held where its middle is out of reach."""
+    robot, bounds = scene.robot, position_bounds(scene.robot, options.limits)
+    first = goal.guess if goal.guess is not None else None
+    if first is None and isinstance(start, State):
+        first = start.on(robot, "start")[0]
+    near = first_configuration(robot, goal, first, bounds)
+    found = find_branches(robot, goal, near, bounds, 1, SEEDS).q
+    if len(found) == 0:
+        return goal
+    off = [part.off(robot, found[0]) for part in goal.parts]
+    at_middle = max(max(float(np.linalg.norm(d)), angle) for d, angle in off) <= SATISFIED
+    return goal if at_middle else freed(goal, found[0])
 
 
 def moved_to(goals: Sequence[FrameGoal], last: Solution) -> Trajectory:

@@ -89,5 +89,7 @@ def _as_start(goal: End) -> End:
     """A goal as the start of what follows, a whole pose in the configuration chosen for it."""
     if not isinstance(goal, FrameGoal) or goal.guess is None:
         return goal
-    whole = all(each.rotation is not None and each.position is not None for each in goal.parts)
+    whole = not goal.regional and all(
+        each.rotation is not None and each.position is not None for each in goal.parts
+    )
     return State(np.asarray(goal.guess)) if whole else goal

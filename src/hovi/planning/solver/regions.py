@@ -10,20 +10,23 @@ is not held may not be exceeded.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 from hovi.conditions.function import linear
+from hovi.discrete.instants import Instants
+from hovi.discrete.trajectory import Trajectory
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.goal_region import Bound, Side
 from hovi.planning.problem.goals import SATISFIED
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.problem.seams import Seam
 from hovi.planning.solver.limits.row_forces import at_instants
-from hovi.planning.solver.solver import Solution
 from hovi.robot.robot import Robot
+from hovi.scene.lagrangian import PointTerms
 from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
@@ -35,8 +38,27 @@ EXCEEDED = 1e-7
 """By how much a bound that is not held may be exceeded, in [m] or [rad]."""
 LARGEST_SINE = 0.9
 """Largest sine of an angle to which a frame is turned at once."""
+RANK = 1e-6
+"""Singular values that count as zero there, relative to the largest."""
+REACHED = 1e-6
+"""Residual up to which a configuration is at the edge, in [m] or [rad]."""
 STEPS = 8
 """Number of Newton steps to a configuration at the edge of a region."""
+
+
+class Solved(Protocol):
+    """A solution of a problem: see Solution."""
+
+    @property
+    def problem(self) -> TrajectoryProblem | None: ...  # noqa: D102
+    @property
+    def trajectory(self) -> Trajectory: ...  # noqa: D102
+    @property
+    def cost(self) -> float: ...  # noqa: D102
+    @property
+    def forces(self) -> list[PointTerms] | None: ...  # noqa: D102
+    @property
+    def instants(self) -> Instants | None: ...  # noqa: D102
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +84,7 @@ def _ends(problem: TrajectoryProblem) -> Iterator[_End]:
         yield _End(problem.goal, problem.grid.intervals, problem.free_ends[1, 0])
 
 
-def with_next_sides(solution: Solution) -> tuple[FrameGoal, ...]:
+def with_next_sides(solution: Solved) -> tuple[FrameGoal, ...]:
     """The goals with regions, with their bounds held where the motion costs less.
 
     The guesses are configurations there. The same goals where all bounds are held as they are.
@@ -72,20 +94,30 @@ def with_next_sides(solution: Solution) -> tuple[FrameGoal, ...]:
     return tuple(_next(solution, each) for each in _ends(problem))
 
 
-def inside_all(solution: Solution) -> tuple[FrameGoal, ...]:
-    """The goals with regions, with none of their bounds held, from where the motion ends."""
-    problem = solution.problem
+def inside(solution: Solved, wanted: Sequence[FrameGoal] | None = None) -> tuple[FrameGoal, ...]:
+    """The goals with regions, with bounds let go that are held elsewhere in the wanted ones.
+
+    wanted: goals to which no motion was found; None to let go of all. The guesses are those of the
+    solution's problem where it has no motion, and where its motion ends else.
+    """
+    problem, q = solution.problem, solution.trajectory.path.q
     assert problem is not None
-    found = []
-    for each in _ends(problem):
-        q = problem.ends[0][1] if each.node == problem.grid.intervals else None
-        parts = [_held(x, [Side.INSIDE] * len(x.bounds)) for x in each.goal.parts]
-        guess = each.goal.guess if q is None else q
-        found.append(dataclasses.replace(parts[0], also=parts[1:], guess=guess))
-    return tuple(found)
+    ends = list(_ends(problem))
+    if wanted is not None:
+        pairs = zip(ends, wanted, strict=True)
+        return tuple(_let_go(each.goal, other.parts, q[each.node]) for each, other in pairs)
+    guesses = {hold.node: hold.q for hold in problem.holds}
+    guesses[problem.grid.intervals] = problem.ends[0][1]
+    return tuple(freed(each.goal, guesses[each.node]) for each in ends)
 
 
-def ends_inside(solution: Solution) -> bool:
+def freed(goal: FrameGoal, q: Array) -> FrameGoal:
+    """A goal with none of its bounds held. q: its guess, (nq,)."""
+    parts = [_held(x, [Side.INSIDE] * len(x.bounds)) for x in goal.parts]
+    return dataclasses.replace(parts[0], also=parts[1:], guess=q)
+
+
+def ends_inside(solution: Solved) -> bool:
     """Whether all frames with regions end in them."""
     problem, q = solution.problem, solution.trajectory.path.q
     assert problem is not None
@@ -93,7 +125,7 @@ def ends_inside(solution: Solution) -> bool:
     return max(missed, default=0.0) <= SATISFIED
 
 
-def region_prices(solution: Solution) -> dict[str, float]:
+def region_prices(solution: Solved) -> dict[str, float]:
     """By how much the cost changes with the room of each bound, dJ/dd, by its name: 0 inside."""
     problem, found = solution.problem, dict[str, float]()
     for end in () if problem is None else _ends(problem):
@@ -114,7 +146,7 @@ def _held(goal: FrameGoal, sides: list[Side]) -> FrameGoal:
     return dataclasses.replace(goal, sides=tuple(sides), also=())
 
 
-def _multipliers(solution: Solution, end: _End) -> dict[int, dict[int, Array]]:
+def _multipliers(solution: Solved, end: _End) -> dict[int, dict[int, Array]]:
     """Those of each bound, by its goal and its first equation: dS/dq + J^T m = 0 in free q."""
     problem, path = solution.problem, solution.trajectory.path
     assert problem is not None
@@ -142,7 +174,7 @@ def _multipliers(solution: Solution, end: _End) -> dict[int, dict[int, Array]]:
     return found
 
 
-def _next(solution: Solution, end: _End) -> FrameGoal:
+def _next(solution: Solved, end: _End) -> FrameGoal:
     problem = solution.problem
     assert problem is not None
     robot, q = problem.robot, solution.trajectory.path.q[end.node]
@@ -162,10 +194,36 @@ def _next(solution: Solution, end: _End) -> FrameGoal:
         targets.append(y)
     if all(list(x.sides) == _sides(part) for x, part in zip(parts, end.goal.parts, strict=True)):
         return end.goal
+    there = _reaching(problem, end, q, np.concatenate(targets))
+    if there is None:  # the edge is out of reach
+        return _let_go(end.goal, parts, q)
+    return dataclasses.replace(parts[0], also=parts[1:], guess=there)
+
+
+def _reaching(problem: TrajectoryProblem, end: _End, q: Array, y: Array) -> Array | None:
+    """The configuration (nq,) near q at which the equations at the middle have values y.
+
+    None where Newton's method finds none within the limits.
+    """
+    robot = problem.robot
     exact = end.goal.middle.difference(robot)
     for _ in range(STEPS):
-        y, J = linear(exact, q, np.zeros(robot.nv))
-        q = robot.integrate(q, np.linalg.lstsq(J[:, 0], np.concatenate(targets) - y, rcond=1e-6)[0])
+        here, J = linear(exact, q, np.zeros(robot.nv))
+        step = np.linalg.lstsq(J[:, 0], y - here, rcond=RANK)[0]
+        q = robot.integrate(q, np.asarray(step, dtype=float))
+    if not np.abs(linear(exact, q, np.zeros(robot.nv))[0] - y).max() <= REACHED:
+        return None
+    limits, at = problem.limits, robot.space.coordinates(q)
+    outside = limits is not None and ((at < limits.lower[0]) | (at > limits.upper[0])).any()
+    return None if outside else q
+
+
+def _let_go(goal: FrameGoal, wanted: Sequence[FrameGoal], q: Array) -> FrameGoal:
+    """A goal with bounds let go that are held elsewhere in the wanted parts. q: its guess."""
+    parts = list[FrameGoal]()
+    for part, other in zip(goal.parts, wanted, strict=True):
+        pairs = zip(_sides(part), _sides(other), strict=True)
+        parts.append(_held(part, [x if x is y else Side.INSIDE for x, y in pairs]))
     return dataclasses.replace(parts[0], also=parts[1:], guess=q)
 
 

@@ -72,6 +72,14 @@ def as_end(given: End, on: Coordinates, name: str) -> State | FrameGoal:
     return state
 
 
+def as_start(given: End, on: Coordinates) -> State | FrameGoal:
+    """As `as_end`, of a start, which has no region. Raises InputError."""
+    start = as_end(given, on, "start")
+    if isinstance(start, FrameGoal) and start.regional:
+        raise InputError("a start takes no region: leave `within` and `within_angle` out.")
+    return start
+
+
 def end_of(table: Mapping[str, Any], name: str) -> State | FrameGoal:
     """The state or the frame goal of a table with END_KEYS. name: in messages, such as "start".
 
