@@ -520,6 +520,11 @@ def _problems() -> list[Call]:
             **{"axis": ([1, 0, 0], [0, 0, 1]), "within_angle": "5 deg", "box_frame": "forearm"},
         ),
         build(hovi.FrameGoal, frame="tip", rpy=[0.1, 0.2, 0.3]),
+        build(
+            hovi.FrameGoal,
+            **{"frame": "tip", "position": [0.2, 0.0, 0.0], "velocity": [0.1, 0.0, 0.0]},
+            angular_velocity=[0.0, 0.1, 0.0],
+        ),
         build(hovi.FrameGoal, frame="tip", quaternion_xyzw=[0.0, 0.0, 0.0, 1.0]),
         build(hovi.FrameGoal, frame="tip", quaternion_wxyz=[1.0, 0.0, 0.0, 0.0]),
         call(

@@ -112,7 +112,7 @@ def _frame_parts(goal: FrameGoal) -> list[str]:
     if goal.directions is not None:
         inner, world = (_numbers(each) for each in goal.directions)
         parts.append(f"  its axis {inner} along {world}")
-    for key in ("within", "within_angle", "box_frame"):
+    for key in ("within", "within_angle", "box_frame", "velocity", "angular_velocity"):
         if getattr(goal, key) is not None:
             parts.append(f"  {key} {getattr(goal, key)}")
     return parts

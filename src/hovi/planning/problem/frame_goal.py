@@ -24,6 +24,7 @@ from hovi.conditions.function import Curvature, Function, Points, Slopes, linear
 from hovi.dynamics.point_function import PointFunction
 from hovi.dynamics.symbolic_dynamics import casadi_functions
 from hovi.errors import InputError, nearest, warn
+from hovi.planning.problem.frame_velocity import FrameVelocity
 from hovi.planning.problem.goal_agreement import Target, require_agreement
 from hovi.planning.problem.goal_region import (
     AXES,
@@ -108,6 +109,9 @@ class FrameGoal:
         of a box, along the axes of the world, 0 where the position is exact.
     within_angle: the largest angle from the rotation or the axis, in [rad] or as "5 deg".
     box_frame: the frame along whose axes the box is; the world by default.
+    velocity: of the frame's origin at the goal, along the axes of the world, shape (3,), in [m/s];
+        the joints that move the frame are free to have any velocity with it. At rest by default.
+    angular_velocity: of its turn, likewise, shape (3,), in [rad/s].
     also: goals of other frames that are reached at the same time, as in a list of goals.
     sides: where the bounds of the region are held, as a plan finds them; at the middle by default.
     Whatever was given, `position`, `rotation` and `axis` hold the goal.
@@ -128,6 +132,8 @@ class FrameGoal:
     within: Within | None = field(default=None, kw_only=True)
     within_angle: float | str | None = field(default=None, kw_only=True)
     box_frame: str | None = field(default=None, kw_only=True)
+    velocity: npt.ArrayLike | None = field(default=None, kw_only=True)
+    angular_velocity: npt.ArrayLike | None = field(default=None, kw_only=True)
     also: Sequence[FrameGoal] = field(default=(), kw_only=True)
     sides: Sequence[Side] = field(default=(), kw_only=True, repr=False)
 
@@ -169,6 +175,9 @@ class FrameGoal:
             object.__setattr__(self, "axis", _axis(self.axis))
         if isinstance(self.free_velocity, str):
             object.__setattr__(self, "free_velocity", (self.free_velocity,))
+        for name in ("velocity", "angular_velocity"):
+            if getattr(self, name) is not None:
+                object.__setattr__(self, name, _vector(name, getattr(self, name)))
         self._check_region()
         if self.also:
             self._take_over_others()
@@ -185,7 +194,11 @@ class FrameGoal:
             raise InputError(
                 "`box_frame` of a frame goal needs a box: give `within` three lengths."
             )
-        _ = self.bounds
+        if len(self.sides) not in (0, len(self.bounds)) or not set(self.sides) <= set(Side):
+            raise InputError(
+                f"`sides` of a frame goal are found by plans, one for each of {len(self.bounds)} "
+                f"bounds, got {shown(self.sides)}: leave them out."
+            )
 
     @cached_property
     def bounds(self) -> tuple[Bound, ...]:
@@ -206,6 +219,33 @@ class FrameGoal:
     def regional(self) -> bool:
         """Whether a frame has a region."""
         return any(each.bounds for each in self.parts)
+
+    @property
+    def moving(self) -> tuple[FrameGoal, ...]:
+        """The parts whose frames have a velocity at the goal."""
+        given = ("velocity", "angular_velocity")
+        return tuple(x for x in self.parts if any(getattr(x, key) is not None for key in given))
+
+    @property
+    def exact(self) -> bool:
+        """Whether it is reached in a configuration at rest, without a region."""
+        return not (self.regional or self.moving)
+
+    def free_velocities(self, robot: Robot) -> tuple[str, ...]:
+        """The joints whose velocity at the goal is free: those that move frames with a velocity."""
+        masks = [moves_frame(robot.model, each.frame) for each in self.moving]
+        own = [x for x in robot.joint_names if any(m[robot.entries_of(x)].any() for m in masks)]
+        return tuple(dict.fromkeys((*own, *self.free_velocity)))
+
+    def velocities(self, robot: Robot) -> tuple[FrameVelocity, ...]:
+        """The velocities that frames have, as functions c(q, v) that vanish there."""
+        asked = ((x.frame, x.velocity, x.angular_velocity) for x in self.moving)
+        return tuple(
+            FrameVelocity.asked(
+                robot, frame, *(None if y is None else np.asarray(y) for y in given)
+            )
+            for frame, *given in asked
+        )
 
     @property
     def middle(self) -> FrameGoal:

@@ -75,7 +75,8 @@ class Bound:
 def room_of(within: Any) -> tuple[float, ...]:
     """The radius of a ball, in [m], or half of the three edges of a box. Raises InputError."""
     what = "`within` of a frame goal"
-    if not isinstance(within, list | tuple | np.ndarray):
+    within = within.tolist() if isinstance(within, np.ndarray) else within
+    if not isinstance(within, list | tuple):
         return (length(within, what),)
     if len(within) != len(AXES):
         raise InputError(f"{what} must be a length, or three for a box, got {within!r:.200}.")

@@ -116,22 +116,26 @@ def goal_state(
     difference = _difference(coordinates, goal)  # which checks the frame
     reached = _solved_inverse_kinematics(coordinates, goal, near.tobytes(), limits)
     moving = _moving_joints(coordinates, goal, tuple(free))
-    state = State(reached.q, free=moving, free_velocity=tuple(goal.free_velocity))
+    velocities = _velocities(coordinates, goal)
+    v = _least_velocity(coordinates, reached.q, velocities) if velocities else None
+    state = State(reached.q, v, free=moving, free_velocity=goal.free_velocities(coordinates))
     advice = f"move the {name} closer or give its FrameGoal a guess"
     reason = reached.reason and (
         f"no configuration that reaches the {name} was found: at the nearest, {reached.reason}; "
         f"{hint_on_frame(coordinates, goal) or advice}"
     )
     wanted = difference if reason else _independent(difference)
-    return GoalState(state, (wanted,) if wanted.size > 0 else (), reason)
+    held = (wanted,) if wanted.size > 0 else ()
+    return GoalState(state, (*held, *velocities), reason)
 
 
 def held_goal(goal: FrameGoal, robot: Robot, q: Array, free: Sequence[str] = ()) -> State | None:
-    """The state at q, (nq,), that satisfies a goal of a frame; None if q does not, or in a region.
+    """The state at q, (nq,), that satisfies a goal of a frame; None if q does not, or for a goal
+    that is not `exact`.
 
     free: joints that are free in it if they do not move the frame.
     """
-    if goal.regional or max(goal.miss(robot, q)) > SATISFIED:
+    if not goal.exact or max(goal.miss(robot, q)) > SATISFIED:
         return None
     moves = goal.moves(robot)
     left = tuple(each for each in free if each == ALL or not moves[robot.entries_of(each)].any())
@@ -140,7 +144,7 @@ def held_goal(goal: FrameGoal, robot: Robot, q: Array, free: Sequence[str] = ())
 
 def is_isolated(goal: FrameGoal, robot: Robot, q: Array) -> bool:
     """Whether q, (nq,), alone satisfies a goal nearby: the goal's Jacobian has full column rank."""
-    if goal.regional:
+    if not goal.exact:
         return False
     moves = goal.moves(robot)
     J = linear(_difference(robot, goal), q, np.zeros(robot.nv))[1][:, 0, moves]
@@ -154,6 +158,13 @@ def _moving_joints(robot: Robot, goal: FrameGoal, free: tuple[str, ...]) -> tupl
         return (ALL,)
     own = (joint for joint in robot.joint_names if moves[robot.entries_of(joint)].any())
     return tuple(dict.fromkeys((*own, *free)))
+
+
+def _least_velocity(robot: Robot, q: Array, wanted: Sequence[Function]) -> Array:
+    """The least v, (nv,), with which frames have their velocities at q, as far as they can."""
+    missed, J = zip(*(linear(each, q, np.zeros(robot.nv)) for each in wanted), strict=True)
+    v = np.linalg.lstsq(np.concatenate(J)[:, 1], -np.concatenate(missed), rcond=FULL_RANK)[0]
+    return np.asarray(v, dtype=float)
 
 
 def via_differences(via: Via, reached: GoalState, coordinates: Coordinates) -> tuple[Function, ...]:
@@ -170,6 +181,11 @@ def via_differences(via: Via, reached: GoalState, coordinates: Coordinates) -> t
 def _difference(robot: Robot, goal: FrameGoal) -> PoseDifference:
     """The difference from a goal, cached; robots and goals are immutable."""
     return goal.difference(robot)
+
+
+@lru_cache(maxsize=256)
+def _velocities(robot: Robot, goal: FrameGoal) -> tuple[Function, ...]:
+    return goal.velocities(robot)
 
 
 @lru_cache(maxsize=256)

@@ -19,7 +19,7 @@ import numpy.typing as npt
 from hovi.conditions.function import linear
 from hovi.discrete.instants import Instants
 from hovi.discrete.trajectory import Trajectory
-from hovi.planning.problem.frame_goal import FrameGoal
+from hovi.planning.problem.frame_goal import FrameGoal, PoseDifference
 from hovi.planning.problem.goal_region import Bound, Side
 from hovi.planning.problem.goals import SATISFIED
 from hovi.planning.problem.problem import TrajectoryProblem
@@ -63,7 +63,7 @@ class Solved(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class _End:
-    """A goal with a region in a motion. node: of the grid. free: which of q, (nv,), are."""
+    """A goal with a region in a motion. node: of the grid. free: which of q and v are, (2, nv)."""
 
     goal: FrameGoal
     node: int
@@ -79,9 +79,9 @@ def _ends(problem: TrajectoryProblem) -> Iterator[_End]:
     seams = sorted((x for x in problem.via if isinstance(x, Seam)), key=lambda each: each.time)
     for seam, hold in zip(seams, problem.holds, strict=True):
         if isinstance(seam.goal, FrameGoal) and seam.goal.regional:
-            yield _End(seam.goal, hold.node, ~hold.fixed[0])
+            yield _End(seam.goal, hold.node, ~hold.fixed)
     if isinstance(problem.goal, FrameGoal) and problem.goal.regional:
-        yield _End(problem.goal, problem.grid.intervals, problem.free_ends[1, 0])
+        yield _End(problem.goal, problem.grid.intervals, problem.free_ends[1, :2])
 
 
 def with_next_sides(solution: Solved) -> tuple[FrameGoal, ...]:
@@ -147,18 +147,25 @@ def _held(goal: FrameGoal, sides: list[Side]) -> FrameGoal:
 
 
 def _multipliers(solution: Solved, end: _End) -> dict[int, dict[int, Array]]:
-    """Those of each bound, by its goal and its first equation: dS/dq + J^T m = 0 in free q."""
+    """Those of each bound, by its goal and its first equation.
+
+    dS/d(q, v) + J^T m = 0 in what is free of q and v, with the other equations at the node.
+    """
     problem, path = solution.problem, solution.trajectory.path
     assert problem is not None
-    robot, node, q = problem.robot, end.node, path.q[end.node]
+    robot, node, (q, v) = problem.robot, end.node, (path.q[end.node], path.v[end.node])
     ld = at_instants(problem, solution.instants).ld
     slopes = ld.derivatives(path, solution.forces)
-    slope = slopes[node - 1, ld.k].copy()
+    slope = slopes[node - 1, ld.k : ld.k + 2].copy()
     if node < problem.grid.intervals:
-        slope += slopes[node, 0]
-    rows = end.goal.difference(robot)
-    J = linear(rows, q, np.zeros(robot.nv))[1][:, 0, end.free]
-    m = np.linalg.lstsq(J.T, -slope[end.free], rcond=None)[0] if len(J) else np.zeros(0)
+        slope += slopes[node, :2]
+    rows = [linear(end.goal.difference(robot), q, v)[1]]
+    for each in problem.equations:
+        own_rows = isinstance(each.y, PoseDifference) and each.y.goal is end.goal
+        if each.where.node == node and not own_rows:
+            rows.append(linear(each.y, q, v, each.where.time)[1])
+    J = np.concatenate(rows)[:, end.free]
+    m = np.asarray(np.linalg.lstsq(J.T, -slope[end.free], rcond=None)[0], dtype=float)
     found, first = dict[int, dict[int, Array]](), 0
     for part in end.goal.parts:
         own, of = dict[int, Array](), {x.first: x for x in part.bounds}

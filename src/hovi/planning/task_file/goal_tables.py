@@ -180,7 +180,7 @@ def end_table(goal: State | FrameGoal, robot: Robot, name: str) -> dict[str, Any
     if goal.directions is not None:
         inner, world = goal.directions
         table["axis"] = {"frame": _floats(inner), "world": _floats(world)}
-    for key in ("within", "within_angle", "box_frame"):
+    for key in ("within", "within_angle", "box_frame", "velocity", "angular_velocity"):
         if getattr(goal, key) is not None:
             table[key] = _plain(getattr(goal, key))
     if goal.free_velocity:

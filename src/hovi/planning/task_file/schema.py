@@ -157,6 +157,12 @@ class EndTable(Table):
     )
     within: Any = Field(default=None, description='a length, such as "10 mm", or a list of three')
     within_angle: Any = Field(default=None, description='an angle, such as "5 deg"')
+    velocity: Direction | None = Field(
+        default=None, description="a list of three finite numbers, in m/s"
+    )
+    angular_velocity: Direction | None = Field(
+        default=None, description="a list of three finite numbers, in rad/s"
+    )
     box_frame: str | None = Field(default=None, description="the name of a frame of the robot")
 
 

@@ -22,7 +22,7 @@ End = State | FrameGoal | Frames | npt.ArrayLike | str | Mapping[str, Any]
 
 FRAME_KEYS = (
     *("pose", "position", "rotation", *ORIENTATIONS, "axis", "guess"),
-    *("within", "within_angle", "box_frame"),
+    *("within", "within_angle", "box_frame", "velocity", "angular_velocity"),
 )
 """Keys of a table that belong to a frame's target; free_velocity belongs to both."""
 STATE_KEYS = ("q", "v", "a", "free", "free_acceleration", "turns")
@@ -73,10 +73,12 @@ def as_end(given: End, on: Coordinates, name: str) -> State | FrameGoal:
 
 
 def as_start(given: End, on: Coordinates) -> State | FrameGoal:
-    """As `as_end`, of a start, which has no region. Raises InputError."""
+    """As `as_end`, of a start, which has no region and no frame that moves. Raises InputError."""
     start = as_end(given, on, "start")
     if isinstance(start, FrameGoal) and start.regional:
         raise InputError("a start takes no region: leave `within` and `within_angle` out.")
+    if isinstance(start, FrameGoal) and start.moving:
+        raise InputError("a start takes no velocity of a frame: give hovi.State(q, v).")
     return start
 
 

@@ -57,7 +57,8 @@ class Waypoint:
         if inner and (isinstance(goal, FrameGoal) or goal.v is None):
             return np.zeros(on.nv, dtype=bool)
         if isinstance(goal, FrameGoal):
-            free = State(np.zeros(0), free_velocity=tuple(goal.free_velocity))
+            assert isinstance(on, Robot)
+            free = State(np.zeros(0), free_velocity=goal.free_velocities(on))
             return np.asarray(~free.free_on(on, self.name)[1])
         return np.asarray((goal.on(on, self.name)[1] == 0.0) & ~goal.free_on(on, self.name)[1])
 
