@@ -106,6 +106,33 @@ def test_a_bound_that_does_not_pay_is_not_held() -> None:
     assert wider.cost == pytest.approx(found.cost, rel=1e-6)
 
 
+def test_an_edge_is_let_go_that_costs_more_than_the_inside() -> None:
+    """The edge to which the multiplier at the middle points lies beyond the best place."""
+    wide = planned("none", within=(0.01, 2.0, 0.01))
+    room = 1.5 * abs(float(offset(wide)[1]))
+    found = planned("none", within=(0.01, room, 0.01))
+    assert found.region_prices["tool0 y"] == 0.0
+    assert abs(float(offset(found)[1])) < room - 1e-3
+    assert found.cost <= wide.cost * (1.0 + 1e-6)
+
+
+def test_the_multiplier_of_an_angle_is_the_slope_of_the_cost() -> None:
+    found, h = planned("none", within_angle=ANGLE), 0.05 * ANGLE
+    more, less = (planned("none", within_angle=ANGLE + step) for step in (h, -h))
+    slope = (more.cost - less.cost) / (2.0 * h)
+    assert found.region_prices == {"tool0 angle": pytest.approx(slope, rel=1e-2)}
+
+
+def test_a_miss_is_measured_from_the_region_along_its_axes() -> None:
+    R = pose(END)[:3, :3]
+    away = pose(END)[:3, 3] - R @ [0.0, 0.0, 0.02]
+    box = [0.001, 0.001, 0.03]
+    along = hovi.FrameGoal(FRAME, position=away, within=box, box_frame=FRAME)
+    assert along.miss(scene().robot, END)[0] < 1e-12
+    world = hovi.FrameGoal(FRAME, position=away, within=box)
+    assert world.miss(scene().robot, END)[0] > 1e-3
+
+
 def test_a_box_may_lie_along_another_frame() -> None:
     """Here along the tool itself, which is turned against the world."""
     found = planned("none", within=(0.0, 0.0, 0.03), box_frame=FRAME)

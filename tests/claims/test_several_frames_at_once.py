@@ -160,6 +160,19 @@ def test_goals_of_one_link_that_agree_are_one() -> None:
     assert sum(each.y.size for each in problem.equations) <= 6
 
 
+def test_equations_that_follow_from_others_are_left_out() -> None:
+    """Three points on a line of a link fix all of its pose but a turn about that line."""
+    goals = [
+        hovi.FrameGoal(each, position=pose(ur5().robot, each, END)[:3, 3], guess=END)
+        for each in ("tool0", "ee_link", "wrist_3_link")
+    ]
+    found = hovi.plan(ur5(), BEGIN, goals, T, **FREE)
+    assert found.success, found.message
+    assert missed(ur5().robot, goals, found.trajectory.q[-1]) < REACHED
+    assert found.problem is not None
+    assert sum(each.y.size for each in found.problem.equations) == 5
+
+
 @pytest.mark.parametrize("shift", [1e-5, -0.02])
 def test_goals_of_one_link_that_contradict_each_other_are_refused(shift: float) -> None:
     goals = [of_wrist("tool0"), of_wrist("wrist_3_link", shift)]
