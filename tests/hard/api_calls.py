@@ -227,6 +227,10 @@ def _models() -> list[Call]:
             **{"collision": None, "srdf": None, "mimic": False},
         ),
         call(hovi.load_robot, hovi.example("two_link.urdf"), locked={"elbow": 0.3}),
+        call(
+            *(hovi.load_robot, hovi.example("two_link.urdf")),
+            tools={"tcp": {"frame": "tip", "position": [0.1, 0.0, 0.0], "rpy": [0.0, 0.1, 0.0]}},
+        ),
         *(own(robot(), name, q, "q") for name in ("check_configuration", "check_velocity")),
         *(own(robot(), name, rows, rows) for name in ("integrate", "difference")),
         *(own(panda(), name, panda().neutral(), np.zeros(9)) for name in ("integrate",)),

@@ -291,6 +291,7 @@ def _load_robot(table: ShapedTable, toml: TomlText) -> Robot:
             free_flyer=table.free_flyer,
             mimic=table.mimic,
             locked=table.locked,
+            tools=table.tools,
             srdf=None if table.srdf is None else folder / table.srdf,
         )
     except HoviError as refused:

@@ -311,6 +311,9 @@ class ShapedTable(Table):
         default=None, description="true or false; by default as the example robot's loader says"
     )
     mimic: bool = Field(default=False, description="true or false")
+    tools: dict[str, dict[str, Any]] = Field(
+        default={}, description="tables [tools.NAME] with a frame, and position and rpy in it"
+    )
     passive: list[str] = Field(default=[], description="a list of joint names")
     begin: float = Field(default=0.0, allow_inf_nan=False, description="a time in seconds")
     duration: Duration | None = Field(default=None, description=DURATION_IN_WORDS)

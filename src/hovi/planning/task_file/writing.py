@@ -27,7 +27,18 @@ from hovi.robot.srdf import read_srdf_file
 from hovi.schemes import by_name
 from hovi.system.files import make_folders, reason, whole_file
 
-_TABLES = ("limits", "start", "goal", "segments", "via", "keep", "obstacles", "grasped", "scheme")
+_TABLES = (
+    "tools",
+    "limits",
+    "start",
+    "goal",
+    "segments",
+    "via",
+    "keep",
+    "obstacles",
+    "grasped",
+    "scheme",
+)
 """Keys that may hold tables, in the order in which the tables are written."""
 _EMPTY: tuple[Any, ...] = (None, [], {})
 
@@ -97,6 +108,7 @@ def _robot_keys(task: Task, folder: Path | None) -> dict[str, Any]:
         "srdf": None if _own_srdf(source) is None else _srdf_name(source),
         "free_flyer": _free_flyer(source),
         "mimic": source.mimic or None,
+        "tools": {each.name: each.to_dict() for each in source.tools},
         "passive": list(task.scene.passive),
         "begin": float(task.scene.begin) or None,
     }
