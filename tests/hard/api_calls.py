@@ -545,6 +545,7 @@ def _problems() -> list[Call]:
         own(frame_goal, "check", robot()),
         own(frame_goal, "difference", robot()),
         build(hovi.Via, time=0.5, goal=goal),
+        build(hovi.Via, time="free", goal=goal),
         build(hovi.Between, lower=-1.0, upper=[1.0, 2.0]),
         build(hovi.Equal, value=[0.1, 0.2]),
         build(hovi.AtTimes, times=[0.3, 0.6]),

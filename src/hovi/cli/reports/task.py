@@ -44,7 +44,10 @@ def describe_task(task: Task) -> str:
     lines += _end(task.start, "start", robot)
     lines += _segments(task) if task.segments else _end(task.goal, "goal", robot)
     for via in options.via:
-        lines += [f"via at {via.time:g} s:", *(f"  {x}" for x in _end(via.goal, "via", robot))]
+        lines += [
+            f"via at {via.time:g} s:" if via.timed else "via at a free time:",
+            *(f"  {x}" for x in _end(via.goal, "via", robot)),
+        ]
     return "\n".join([*lines, "", task.planned_scene.describe(), "", robot.describe()])
 
 

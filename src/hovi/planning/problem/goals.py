@@ -29,6 +29,8 @@ from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 
+FREE = "free"
+"""The time of a via point that is passed when that costs least."""
 SATISFIED = 1e-6
 """Largest distance, in [m], and angle, in [rad], between a goal and a frame that satisfies it."""
 FULL_RANK = 1e-6
@@ -40,7 +42,8 @@ FULL_RANK = 1e-6
 class Via:
     """A via point: a goal that the motion reaches at a given time.
 
-    time: in [s]; a text such as "500 ms" is converted.
+    time: in [s]; a text such as "500 ms" is converted. "free" for the time at which passing it
+        costs least, of motions of a given duration; infinite from then on.
     goal: a State, whose velocity is free if none is given, or its configuration alone; or a
         FrameGoal, or a list of them for several frames at once, which leaves all velocities free.
     Raises InputError for a time that is not positive, or another kind of goal.
@@ -62,8 +65,10 @@ class Via:
                 f"the goal of a via point must be a hovi.State(q) or a hovi.FrameGoal, got "
                 f"{self.goal!r}."
             )
-        object.__setattr__(self, "time", seconds(self.time, "the time of a via point"))
-        if not (np.isfinite(self.time) and self.time > 0):
+        free = self.time in (FREE, np.inf)
+        time = np.inf if free else seconds(self.time, "the time of a via point")
+        object.__setattr__(self, "time", time)
+        if not (free or (np.isfinite(time) and time > 0)):
             raise InputError(f"the time of a via point must be positive, got {self.time} s.")
         if isinstance(self.goal, State) and self.goal.turns and not self.takes_turns:
             raise InputError("a via point takes no `turns`: set them on the goal.")
@@ -76,10 +81,24 @@ class Via:
         if given:
             raise InputError(f"a via point takes no `{given[0]}`: leave it out.")
 
+    @property
+    def timed(self) -> bool:
+        """Whether it has a time."""
+        return bool(np.isfinite(self.time))
+
 
 def _is_given(value: object) -> bool:
     """Whether a field of a State is neither None nor an empty sequence."""
     return value is not None and not (isinstance(value, tuple | list) and len(value) == 0)
+
+
+def require_times(via: Sequence[Via]) -> None:
+    """Raise InputError for via points without times."""
+    if not all(each.timed for each in via):
+        raise InputError(
+            'a via point with time = "free" is for hovi.plan: give the via points of a problem or '
+            "a sequence their times, or make them goals of segments with free durations."
+        )
 
 
 @dataclass(frozen=True, eq=False)

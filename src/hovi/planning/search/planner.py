@@ -139,9 +139,33 @@ def plan(
         given = start_end, goal_end
     length = as_duration(duration)
     planned = functools.partial(_settled, options.aiming(scene), *given, length, progress)
+    if not all(each.timed for each in options.via):
+        return _through(options.aiming(scene), *given, length, progress, options)
     if options.objective == "time":
         return least_duration(planned, length, options)
     return planned(options, began)
+
+
+def _through(
+    scene: Scene,
+    start: State | FrameGoal,
+    goal: State | FrameGoal,
+    duration: float | tuple[float, float],
+    progress: Progress | None,
+    options: PlanOptions,
+) -> Solution:
+    """The plan through via points without times."""
+    from hovi.planning.search.via_times import with_best_times  # most have times
+
+    def planned(
+        timed: PlanOptions, near: Trajectory | None, settled: State | FrameGoal | None
+    ) -> Solution:
+        if near is None:
+            return _settled(scene, start, goal, duration, progress, timed)
+        end = goal if settled is None else settled
+        return _planned(scene, start, end, duration, progress, timed, None, near)
+
+    return with_best_times(planned, options, scene.robot, (start, goal), duration)
 
 
 def _settled(

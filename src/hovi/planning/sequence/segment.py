@@ -22,6 +22,7 @@ from hovi.effects import Effect
 from hovi.effects.registration import as_effects
 from hovi.errors import InputError
 from hovi.planning.problem.frame_goal import FrameGoal
+from hovi.planning.problem.goals import require_times
 from hovi.planning.problem.limits import Limits
 from hovi.planning.problem.notation.ends import End, are_frames, as_end
 from hovi.planning.search.job import stops_of
@@ -180,6 +181,7 @@ def checked_segments(segments: Any, options: PlanOptions) -> tuple[Segment, ...]
                     f"the goal of {name!r} takes no `{key}`, since accelerations are free where "
                     "segments meet: leave it out."
                 )
+    require_times(options.via)
     free = isinstance(duration_of(segments), tuple)
     if options.time_weight != 0 and not free:
         raise InputError(

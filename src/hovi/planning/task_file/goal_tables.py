@@ -14,7 +14,7 @@ from hovi.discrete.grid import outside_motion
 from hovi.discrete.state import State
 from hovi.errors import HoviError, InputError, SceneError
 from hovi.planning.problem.frame_goal import FrameGoal, all_of
-from hovi.planning.problem.goals import Via
+from hovi.planning.problem.goals import FREE, Via
 from hovi.planning.problem.notation.ends import END_KEYS, EndError, end_of
 from hovi.planning.problem.notation.via_points import require_no_rates
 from hovi.planning.search.group import with_others
@@ -131,7 +131,7 @@ def read_via(
     points = []
     for i, table in enumerate(tables):
         longest, time = float(np.max(duration)), _time(table.time, ("via", i, "time"), toml)
-        if time >= longest:
+        if np.isfinite(time) and time >= longest:
             sentence = outside_motion(time, longest)
             raise toml.error(("via", i, "time"), sentence)
         try:
@@ -147,6 +147,8 @@ def read_via(
 
 
 def _time(given: float | str, keys: Keys, toml: TomlText) -> float:
+    if given == FREE:
+        return np.inf
     try:
         return seconds(given, "the time of a via point")
     except InputError as wrong:
@@ -193,7 +195,7 @@ def via_table(via: Via, robot: Robot) -> dict[str, Any]:
     table = end_table(via.goal, robot, "via")
     if isinstance(via.goal, State) and via.goal.v is not None:
         table["v"] = _floats(via.goal.on(robot, "via")[1])
-    return {"time": float(via.time), **table}
+    return {"time": float(via.time) if via.timed else FREE, **table}
 
 
 def state_table(state: State, robot: Robot, name: str) -> dict[str, Any]:

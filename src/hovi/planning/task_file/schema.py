@@ -211,10 +211,13 @@ _END = (
 _FRAMES = "; or tables [{}], one for each of several frames at once"
 
 
+_TIME_OF_VIA = f'{SECONDS_IN_WORDS}, or "free"'
+
+
 class ViaTable(GoalTable):
     """[[via]]."""
 
-    time: PositiveSeconds = Field(description=SECONDS_IN_WORDS)
+    time: PositiveSeconds | Literal["free"] = Field(description=_TIME_OF_VIA)
 
 
 class SegmentTable(Table):
