@@ -49,7 +49,7 @@ LARGEST_STEP, FIRST_STEP = 0.5, 0.1
 """Largest change of a parameter in a step, and in the first one: lengths change by as much."""
 ROUNDS = 3
 """Largest number of plans with times that were found on the grid of the last one."""
-LEAST_SHARE = 0.05
+LEAST_FRACTION = 0.05
 """Least first length of time, relative to the mean one."""
 Planned = Callable[[PlanOptions, Trajectory | None, End | None], Solution]
 """A plan with options, from a motion if there is one, to a goal that an earlier plan settled."""
@@ -118,8 +118,8 @@ def _first_lengths(
             there = nearest_configuration(robot, each, q, bounds).q
         ways.append(float(np.abs(robot.difference(q, there)).max()))
         q = there
-    shares = np.maximum(ways, LEAST_SHARE * max(np.mean(ways), np.finfo(float).tiny))
-    return np.asarray(T * shares / shares.sum())
+    fractions = np.maximum(ways, LEAST_FRACTION * max(np.mean(ways), np.finfo(float).tiny))
+    return np.asarray(T * fractions / fractions.sum())
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,9 +19,10 @@ from pydantic import (
     create_model,
 )
 
-from hovi.checks.units import DURATION_IN_WORDS, SECONDS_IN_WORDS
+from hovi.checks.units import DURATION_IN_WORDS
 from hovi.planning.obstacles.obstacle import GRASPED_KEYS
 from hovi.planning.problem.arms.limit_set import LimitSetName
+from hovi.planning.problem.notation.via_points import TIME_IN_WORDS
 from hovi.planning.search.option_fields import SceneKey, option_infos
 from hovi.planning.search.options import MAX_INTERVALS, PlanOptions
 
@@ -211,13 +212,10 @@ _END = (
 _FRAMES = "; or tables [{}], one for each of several frames at once"
 
 
-_TIME_OF_VIA = f'{SECONDS_IN_WORDS}, or "free"'
-
-
 class ViaTable(GoalTable):
     """[[via]]."""
 
-    time: PositiveSeconds | Literal["free"] = Field(description=_TIME_OF_VIA)
+    time: PositiveSeconds | Literal["free"] = Field(description=TIME_IN_WORDS)
 
 
 class SegmentTable(Table):

@@ -96,7 +96,8 @@ def end_of(table: Mapping[str, Any], name: str) -> State | FrameGoal:
     if "frame" not in given:
         for key in FRAME_KEYS:
             if key in given:
-                raise EndError(f"`{key}` needs a `frame`.", key)
+                more = ": velocities of joints are `v`" if "velocity" in key else ""
+                raise EndError(f"`{key}` needs a `frame`{more}.", key)
         if "q" not in given:
             raise EndError(f"`{name}` needs q, or a frame and its target.")
         return State(given.pop("q"), given.pop("v", None), **given)
