@@ -227,6 +227,10 @@ def _models() -> list[Call]:
             **{"collision": None, "srdf": None, "mimic": False},
         ),
         call(hovi.load_robot, hovi.example("two_link.urdf"), locked={"elbow": 0.3}),
+        call(
+            *(hovi.load_robot, hovi.example("two_link.urdf")),
+            tools={"tcp": {"frame": "tip", "position": [0.1, 0.0, 0.0], "rpy": [0.0, 0.1, 0.0]}},
+        ),
         *(own(robot(), name, q, "q") for name in ("check_configuration", "check_velocity")),
         *(own(robot(), name, rows, rows) for name in ("integrate", "difference")),
         *(own(panda(), name, panda().neutral(), np.zeros(9)) for name in ("integrate",)),
@@ -513,7 +517,18 @@ def _problems() -> list[Call]:
         build(hovi.FrameGoal, frame="tip", axis=([1, 0, 0], [0, 0, 1])),
         build(hovi.FrameGoal, frame="tip", axis={"frame": [1, 0, 0], "world": [0, 0, 1]}),
         build(hovi.FrameGoal, frame="tip", pose=np.eye(4)),
+        build(hovi.FrameGoal, frame="tip", position=[0.2, 0.0, 0.0], also=[frame_goal]),
+        build(
+            hovi.FrameGoal,
+            **{"frame": "tip", "position": [0.2, 0.0, 0.0], "within": ["10 mm", 0.0, 0.02]},
+            **{"axis": ([1, 0, 0], [0, 0, 1]), "within_angle": "5 deg", "box_frame": "forearm"},
+        ),
         build(hovi.FrameGoal, frame="tip", rpy=[0.1, 0.2, 0.3]),
+        build(
+            hovi.FrameGoal,
+            **{"frame": "tip", "position": [0.2, 0.0, 0.0], "velocity": [0.1, 0.0, 0.0]},
+            angular_velocity=[0.0, 0.1, 0.0],
+        ),
         build(hovi.FrameGoal, frame="tip", quaternion_xyzw=[0.0, 0.0, 0.0, 1.0]),
         build(hovi.FrameGoal, frame="tip", quaternion_wxyz=[1.0, 0.0, 0.0, 0.0]),
         call(
@@ -530,6 +545,7 @@ def _problems() -> list[Call]:
         own(frame_goal, "check", robot()),
         own(frame_goal, "difference", robot()),
         build(hovi.Via, time=0.5, goal=goal),
+        build(hovi.Via, time="free", goal=goal),
         build(hovi.Between, lower=-1.0, upper=[1.0, 2.0]),
         build(hovi.Equal, value=[0.1, 0.2]),
         build(hovi.AtTimes, times=[0.3, 0.6]),

@@ -25,6 +25,7 @@ from hovi.robot.model import build_full_model, build_model, locked_model
 from hovi.robot.robot import Robot
 from hovi.robot.source import MAX_POSITION, RobotSource, absolute_folders, text_hash
 from hovi.robot.srdf import read_srdf_file
+from hovi.robot.tool import Tool, as_tools, with_tools
 from hovi.robot.urdf.check import MAX_DOF, checked_urdf, read_urdf
 from hovi.robot.urdf.closed_loops import closed_loops
 
@@ -137,7 +138,7 @@ def _led(urdf: str, name: str, held: Mapping[str, float]) -> list[Coupling]:
     return [coupling for coupling in couplings if coupling.leader in held]
 
 
-@check_arguments_except("x", "mimic", "free_flyer", "locked", "package_dirs", "xacro_args")
+@check_arguments_except("x", "mimic", "free_flyer", "locked", "package_dirs", "xacro_args", "tools")
 def load_robot(
     x: str | Path | pin.Model,
     *,
@@ -149,6 +150,7 @@ def load_robot(
     srdf: str | Path | None = None,
     mimic: bool = False,
     xacro_args: Mapping[str, Any] | None = None,
+    tools: Mapping[str, Mapping[str, Any]] | None = None,
 ) -> Robot:
     """Load a robot. Models that do not support planning load as well; the problem refuses them.
 
@@ -166,16 +168,19 @@ def load_robot(
     mimic: whether joints with a <mimic> tag follow their leaders, without coordinates of their own
         in q; otherwise they move freely. A pinocchio.Model has its own couplings.
     xacro_args: values of a xacro file's arguments by name, as `name:=value` elsewhere.
+    tools: frames that are added to the robot, by name, such as the point of a tool at an offset
+        from the flange: {"tcp": {"frame": "tool0", "position": [0, 0, 0.12], "rpy": [0, 0, 0]}}, in
+        [m] and [rad] in that frame. Goals, what is kept and formulas name them as other frames.
     Raises ModelError for an unknown file or name, an invalid URDF, an unknown joint to lock;
     InputError for a mimic or free_flyer that is neither True nor False.
     """
     expect(mimic, bool, "mimic=True or mimic=False")
     expect(False if free_flyer is None else free_flyer, bool, "free_flyer=True or free_flyer=False")
-    held = _checked(locked)
+    held, added = _checked(locked), as_tools({} if tools is None else tools)
     folders = absolute_folders(package_dirs)
     semantics = None if srdf is None else Path(srdf)
     if isinstance(x, pin.Model):
-        return _from_model(x, x.name, held, (visual, collision), semantics)
+        return _from_model(x, x.name, held, (visual, collision), semantics, tools=added)
     if not isinstance(x, str | Path):
         raise ModelError(f"a robot is a path, a name or a pinocchio.Model, not {type(x).__name__}.")
     form = format_of(x)
@@ -192,14 +197,15 @@ def load_robot(
         found_model = model_of_mjcf(Path(x), bool(free_flyer), held)
         given = (visual or found_model.visual, collision or found_model.collision)
         model = found_model.model
-        return _from_model(model, model.name, held, given, semantics, found_model.notes)
+        return _from_model(model, model.name, held, given, semantics, found_model.notes, added)
     if isinstance(x, Path) or is_path(x):
         source = file_source(Path(x), folders, held, bool(free_flyer), semantics, mimic, given_args)
     elif x in BUILT_IN_CODE:
         model, *both = build_in_code(x)
-        return _from_model(model, x, held, (both[0], both[1]), semantics)
+        return _from_model(model, x, held, (both[0], both[1]), semantics, tools=added)
     else:
         source = example_source(x, folders, held, free_flyer, semantics, mimic)
+    source = replace(source, tools=added)
     model = build_model(source)
     return Robot(source.reference if source.kind == "example" else model.name, model, source)
 
@@ -246,13 +252,17 @@ def _from_model(
     given: tuple[pin.GeometryModel | None, pin.GeometryModel | None],
     srdf: Path | None = None,
     notes: tuple[str, ...] = (),
+    tools: tuple[Tool, ...] = (),
 ) -> Robot:
     if model.nv > MAX_DOF:
         raise ModelError(
             f"model {name!r} has {model.nv} degrees of freedom, at most {MAX_DOF} are "
             "accepted: lock joints with pinocchio.buildReducedModel first."
         )
-    model, shapes = model.copy(), [shape.copy() for shape in given if shape is not None]
+    model, shapes = (
+        with_tools(model.copy(), tools),
+        [shape.copy() for shape in given if shape is not None],
+    )
     for shape in shapes:
         _attach(shape, model, name)
     held = locked if isinstance(locked, Mapping) else dict.fromkeys(locked, 0.0)
@@ -260,5 +270,6 @@ def _from_model(
     queue = iter(shapes)
     kept = [None if shape is None else next(queue) for shape in given]
     text = None if srdf is None else read_srdf_file(srdf)
-    source = RobotSource(kind="model", reference=name, **_held(locked), srdf=text, notes=notes)
+    more: dict[str, Any] = {"srdf": text, "notes": notes, "tools": tools}
+    source = RobotSource(kind="model", reference=name, **_held(locked), **more)
     return Robot(name, reduced, source, (kept[0], kept[1]))

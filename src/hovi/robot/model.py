@@ -13,6 +13,7 @@ from hovi.errors import ModelError, nearest
 from hovi.robot.mimic_model import Coupling, couplings_of, uncoupled
 from hovi.robot.mimic_tags import held_values, leaders_first, read_couplings, with_mimics
 from hovi.robot.source import RobotSource
+from hovi.robot.tool import with_tools
 from hovi.robot.urdf.normalize import plain_urdf
 
 Array = npt.NDArray[np.float64]
@@ -54,7 +55,7 @@ def _full_model(source: RobotSource) -> pin.Model:
             f"robot {source.reference!r} has a joint 'root_joint', the name of its floating base: "
             "rename that joint, or load the robot without free_flyer."
         )
-    model = _with_armature(model, source.armature)
+    model = with_tools(_with_armature(model, source.armature), source.tools)
     return leaders_first(model, _moving(couplings_in(source), source.held))
 
 

@@ -13,6 +13,7 @@ from hovi.checks.names import as_names
 from hovi.errors import ModelError
 from hovi.robot.formats.packages import holds_all_files
 from hovi.robot.meshes.stored_meshes import StoredMeshes
+from hovi.robot.tool import Tool, as_tools
 from hovi.system.dataclass import dataclass
 
 SourceKind = Literal["urdf", "example", "model"]
@@ -38,6 +39,7 @@ class RobotSource:
     armature: reflected rotor inertia in [kg m^2] by joint, from an example's SRDF.
     srdf: the text of the SRDF, or None.
     mimic: whether joints with a <mimic> tag follow their leaders.
+    tools: frames that are added to the model.
     notes: what the file of a model says and the model does not have, for `hovi info`.
     meshes: those stored in a motion's file, which are taken before any of a folder.
     Raises ModelError for such a folder.
@@ -56,6 +58,7 @@ class RobotSource:
     srdf: str | None = field(default=None, repr=False)
     mimic: bool = False
     notes: tuple[str, ...] = ()
+    tools: tuple[Tool, ...] = ()
     meshes: StoredMeshes = field(default=_NO_MESHES, compare=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -77,6 +80,7 @@ class RobotSource:
             **({"locked_at": list(self.locked_at)} if any(self.locked_at) else {}),
             "free_flyer": self.free_flyer,
             **({"mimic": True} if self.mimic else {}),
+            **({"tools": {x.name: x.to_dict() for x in self.tools}} if self.tools else {}),
             "armature": dict(self.armature),
             "srdf": self.srdf,
         }
@@ -116,6 +120,7 @@ class RobotSource:
             armature=_armature(_entry(data, "armature", dict)),
             srdf=None if data.get("srdf") is None else _entry(data, "srdf", str),
             mimic="mimic" in data and _entry(data, "mimic", bool),
+            tools=as_tools(data.get("tools", {})),
             meshes=(meshes or {}).get(sha256 or "", _NO_MESHES),
         )
 

@@ -44,7 +44,10 @@ def describe_task(task: Task) -> str:
     lines += _end(task.start, "start", robot)
     lines += _segments(task) if task.segments else _end(task.goal, "goal", robot)
     for via in options.via:
-        lines += [f"via at {via.time:g} s:", *(f"  {x}" for x in _end(via.goal, "via", robot))]
+        lines += [
+            f"via at {via.time:g} s:" if via.timed else "via at a free time:",
+            *(f"  {x}" for x in _end(via.goal, "via", robot)),
+        ]
     return "\n".join([*lines, "", task.planned_scene.describe(), "", robot.describe()])
 
 
@@ -88,7 +91,8 @@ def _end(goal: State | FrameGoal, name: str, robot: Robot) -> list[str]:
     from hovi.planning.problem.frame_goal import FrameGoal
 
     if isinstance(goal, FrameGoal):
-        return [f"{name}: frame {goal.frame!r}", *_frame_parts(goal)]
+        parts = ((f"{name}: frame {x.frame!r}", *_frame_parts(x)) for x in goal.parts)
+        return [line for part in parts for line in part]
     q, v = goal.on(robot, name)
     lines = [f"{name} q = {_numbers(q)}", f"{name} v = {_numbers(v)}"]
     angles = goal.angles_on(robot)
@@ -111,6 +115,9 @@ def _frame_parts(goal: FrameGoal) -> list[str]:
     if goal.directions is not None:
         inner, world = (_numbers(each) for each in goal.directions)
         parts.append(f"  its axis {inner} along {world}")
+    for key in ("within", "within_angle", "box_frame", "velocity", "angular_velocity"):
+        if getattr(goal, key) is not None:
+            parts.append(f"  {key} {getattr(goal, key)}")
     return parts
 
 

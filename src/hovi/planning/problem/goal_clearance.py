@@ -25,9 +25,9 @@ POINT = coal.Sphere(0.0)
 def goal_distances(goal: FrameGoal, distances: Distances) -> dict[Pair, float]:
     """Upper bounds of the distances of the goal's link from obstacles, in [m], by pair.
 
-    Exact for a pose, a bound for a position, none for a goal without a position.
+    Of its own frame: exact for a pose, a bound for a position, none for others and for regions.
     """
-    if goal.position is None:
+    if goal.position is None or goal.bounds:
         return {}
     frame = frame_named(distances.robot.model, goal.frame)
     at = np.asarray(goal.position, dtype=float)
@@ -54,6 +54,12 @@ def goal_in_obstacle(goal: FrameGoal, name: str, distances: Distances, margin: f
 
     "" if there is none. name: of the goal in messages. margin: in [m].
     """
+    found_of = (_own_frame_in_obstacle(x, name, distances, margin) for x in goal.parts)
+    return next(filter(None, found_of), "")
+
+
+def _own_frame_in_obstacle(goal: FrameGoal, name: str, distances: Distances, margin: float) -> str:
+    """As `goal_in_obstacle`, of the goal's own frame."""
     found = goal_distances(goal, distances)
     if not found or min(found.values()) >= margin:
         return ""

@@ -20,11 +20,10 @@ from hovi.planning.obstacles.obstacle import Obstacle
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.kinematics.branches import Branches, find_branches
 from hovi.planning.problem.limits import Limits, Range, as_limits
-from hovi.planning.problem.notation.ends import end_of
+from hovi.planning.problem.notation.ends import Frames, are_frames, end_of, frames_of
 from hovi.planning.problem.presolve.frame_hints import hint_on_frame
 from hovi.robot.robot import Robot
 from hovi.robot.space.joint_table import configuration_of
-from hovi.robot.tip_frame import moves_frame
 from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
@@ -53,7 +52,7 @@ class InverseKinematicsResult:
 @check_arguments_except("robot", "goal", "near", "limits", "obstacles", "margin", "most", "seeds")
 def inverse_kinematics(
     robot: Robot,
-    goal: FrameGoal | Mapping[str, Any],
+    goal: FrameGoal | Mapping[str, Any] | Frames,
     *,
     near: npt.ArrayLike | str | Mapping[str, Any] | None = None,
     limits: str | Limits | Mapping[str, Any] = "urdf",
@@ -73,7 +72,7 @@ def inverse_kinematics(
     `near`.
 
     goal: what the frame has to reach: a FrameGoal, or a table such as {"frame": "tool0",
-        "position": [0.4, 0.2, 0.3]}.
+        "position": [0.4, 0.2, 0.3]}; or a list of these for several frames at once.
     near: a configuration (nq,), the name of a pose or a table of joints, from which the search
         begins; by default the goal's guess, or the middle of the joints' ranges, 0 for joints
         without or with full turns.
@@ -85,6 +84,8 @@ def inverse_kinematics(
     Raises UnreachableError, with the nearest configuration, if none is found; InputError.
     """
     expect(robot, Robot, "one from hovi.load_robot")
+    if are_frames(goal):
+        goal = frames_of(goal, "goal")
     if isinstance(goal, Mapping):
         goal = end_of(goal, "goal")  # type: ignore[assignment]  # which the next line checks
     expect(goal, FrameGoal, "hovi.FrameGoal(frame, ...), or its table with a `frame`")
@@ -163,7 +164,7 @@ def first_configuration(
     if goal.guess is not None:
         return robot.check_configuration(goal.guess, "the goal's guess")
     lower, upper = bounds
-    centered = moves_frame(robot.model, goal.frame) & (upper - lower < 2 * np.pi)
+    centered = goal.moves(robot) & (upper - lower < 2 * np.pi)
     middle = np.zeros(robot.nv)
     middle[centered] = (lower[centered] + upper[centered]) / 2
     q = robot.neutral()

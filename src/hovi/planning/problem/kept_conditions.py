@@ -106,9 +106,10 @@ def _poses(
     """What an end says of frames."""
 
     def pose(frame: str) -> Pose:
-        if isinstance(end, FrameGoal) and end.frame == frame:
-            given = end.rotation, end.position
-            return Pose(*(None if each is None else np.asarray(each) for each in given))
+        for part in end.parts if isinstance(end, FrameGoal) else ():
+            if part.frame == frame and not (part.bounds and name == "start"):
+                given = part.rotation, part.position
+                return Pose(*(None if each is None else np.asarray(each) for each in given))
         if isinstance(end, State) and not end.free:
             robot.check_frame_moves(frame)
             matrix = robot.frame_pose(frame, end.on(robot, name)[0])

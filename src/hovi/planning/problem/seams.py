@@ -13,7 +13,7 @@ from hovi.discrete.grid import DiscretePath, Grid
 from hovi.discrete.guess import Curve, Ends, joined, named_curve, with_ends_of_nodes
 from hovi.discrete.interval_paths import path_of_order, regularized_nodes
 from hovi.discrete.state import State
-from hovi.planning.problem.goals import Via, goal_state, via_differences
+from hovi.planning.problem.goals import Via, goal_state, require_times, via_differences
 from hovi.planning.problem.limits import Limits
 from hovi.planning.problem.notation.goal_turns import keeping_turns, turns_to
 from hovi.robot.space.coordinates import Coordinates
@@ -35,6 +35,7 @@ class Seam(Via):
 
     unreachable: str = ""
     takes_turns: ClassVar[bool] = True
+    takes_regions: ClassVar[bool] = True
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,6 +97,7 @@ class ViaPoints:
         equations: list[Equation] = []
         holds: list[Hold] = []
         reason, last, q0 = "", start, start.on(coordinates, "start")[0]
+        require_times(via)
         for each in sorted(via, key=lambda each: isinstance(each, Seam) * each.time):
             name, node = f"via point at {each.time:g} s", grid.node_at(each.time)
             bounds = None if limits is None else limits.until(each.time)

@@ -272,7 +272,7 @@ class _Choice:
             _Pair(start, q, number > 0)
             for branch in found
             for number, q in enumerate(
-                with_full_turns(robot, goal.frame, branch, near, self._bounds)
+                with_full_turns(robot, goal.moves(robot), branch, near, self._bounds)
             )
         ]
 
@@ -361,7 +361,7 @@ class _Choice:
             options = options.with_changes(obstacles=(), self_collision=False)
         goal = self.goal
         if isinstance(goal, FrameGoal):
-            goal = State(pair.q, free_velocity=tuple(goal.free_velocity))
+            goal = State(pair.q, free_velocity=goal.free_velocities(self.scene.robot))
         return Job(self.scene, grid, pair.start, goal, options).problem()
 
 

@@ -22,7 +22,7 @@ from hovi.planning.clearance.self_collisions import not_looked_at, pairs_left_ou
 from hovi.planning.problem.clock import Clock
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.goals import Via
-from hovi.planning.problem.notation.ends import End, as_end
+from hovi.planning.problem.notation.ends import End, as_end, as_start
 from hovi.planning.problem.notation.goal_turns import says_turns, turns_sentence
 from hovi.planning.problem.notation.smoothing import smoothed
 from hovi.planning.problem.presolve.assumptions import assumptions
@@ -119,7 +119,8 @@ def plan(
     scene: the robot with its effects.
     start, goal: a State, a configuration of shape (nq,) at rest, the name of a pose, or a
         FrameGoal; or a table of joint positions, or one with the keys of a scene file's [goal],
-        such as {"frame": "tool0", "position": [0.4, 0.2, 0.3]}.
+        such as {"frame": "tool0", "position": [0.4, 0.2, 0.3]}; a list of FrameGoals, or of their
+        tables, is for several frames at once.
     duration: T in [s], or a text such as "1.5 s", "500 ms" or "2 min"; or a pair (lower, upper)
         of these for a free duration.
     progress: called with a line of text and the completed fraction, in [0, 1]; in a notebook, a
@@ -141,18 +142,68 @@ def plan(
     expect(options, PlanOptions, "hovi.PlanOptions(...), or its fields by keyword")
     options = options.with_changes(**changes)
     scene = options.holding(scene)
-    first = as_end(start, scene.robot, "start")
+    first = as_start(start, scene.robot)
     goal = with_others(goal, options.group, scene.robot, first)
     given = first, _goal(goal, scene.robot, options)
     if options.group is not None:
         scene, start_end, goal_end = in_group(scene, options.group, *given)
         given = start_end, goal_end
     length = as_duration(duration)
-    planned = functools.partial(_planned, options.aiming(scene), *given, length, progress)
+    planned = functools.partial(_settled, options.aiming(scene), *given, length, progress)
     with watched(on_iterate, cancel):
+        if not all(each.timed for each in options.via):
+            return _through(options.aiming(scene), *given, length, progress, options)
         if options.objective == "time":
             return least_duration(planned, length, options)
         return planned(options, began)
+
+
+def _through(
+    scene: Scene,
+    start: State | FrameGoal,
+    goal: State | FrameGoal,
+    duration: float | tuple[float, float],
+    progress: Progress | None,
+    options: PlanOptions,
+) -> Solution:
+    """The plan through via points without times."""
+    from hovi.planning.search.via_times import with_best_times  # most have times
+
+    def planned(
+        timed: PlanOptions, near: Trajectory | None, settled: State | FrameGoal | None
+    ) -> Solution:
+        if near is None:
+            return _settled(scene, start, goal, duration, progress, timed)
+        end = goal if settled is None else settled
+        return _planned(scene, start, end, duration, progress, timed, None, near)
+
+    return with_best_times(planned, options, scene.robot, (start, goal), duration)
+
+
+def _settled(
+    scene: Scene,
+    start: State | FrameGoal,
+    goal: State | FrameGoal,
+    duration: float | tuple[float, float],
+    progress: Progress | None,
+    options: PlanOptions,
+    began: float | None = None,
+) -> Solution:
+    """As `_planned`, with the region of the goal settled if it has one."""
+    planned = functools.partial(_planned, scene)
+    if not (isinstance(goal, FrameGoal) and goal.regional):
+        return planned(start, goal, duration, progress, options, began)
+    from hovi.planning.search.settled_regions import begun, moved_to, settled  # most are exact
+
+    goal = begun(goal, start, scene, options)
+    found = planned(start, goal, duration, progress, options, began)
+
+    def again(goals: Sequence[FrameGoal], last: Solution) -> Solution:
+        assert last.problem is not None
+        near = moved_to(goals, last)
+        return planned(last.problem.start, goals[0], duration, progress, options, None, near)
+
+    return settled(found, again)
 
 
 def _planned(
@@ -163,10 +214,12 @@ def _planned(
     progress: Progress | None,
     options: PlanOptions,
     began: float | None = None,
+    near: Trajectory | None = None,
 ) -> Solution:
     """The motion in a scene whose robot holds what is grasped, with the effects of the objective.
 
-    began: when the plan did, by the clock; now by default.
+    began: when the plan did, by the clock; now by default. near: a motion of a similar plan, from
+    which it begins in place of the guess.
     """
     began = time.perf_counter() if began is None else began
     if options.keep:
@@ -175,7 +228,9 @@ def _planned(
         options, goal = with_kept(options, scene.robot, start, goal, duration)
     given = start, goal
     chosen, apart = kept_apart(options.on(scene), scene.robot, ends_of(*given, options.via))
-    deadline = Deadline(chosen.time_limit_seconds)
+    deadline, guess = Deadline(chosen.time_limit_seconds), chosen.guess
+    if near is not None:
+        chosen = chosen.with_changes(guess=near, starts=1)
     free, T = _time(duration, chosen)
     planning = _Planning(scene, *given, T, chosen, free)
     job = planning.job(nearest_ends(scene, *given, chosen), deadline)
@@ -197,9 +252,10 @@ def _planned(
     reason = "" if search.ends is None else search.ends.reason
     found = infeasible_at_once(longest, chosen.guess, reason) if reason else search.run(began)
     if isinstance(goal, FrameGoal):
-        motion = with_metadata(found.trajectory, **{ASKED_GOAL: goal.to_table()})
+        motion = with_metadata(found.trajectory, **{ASKED_GOAL: goal.to_tables()})
         found = dataclasses.replace(found, trajectory=motion)
-    return with_notes(found, [search.fine.scene], search.fine.options, apart)
+    options = search.fine.options.with_changes(guess=guess)
+    return with_notes(found, [search.fine.scene], options, apart)
 
 
 def _says_the_same(job: Job, free: FreeDuration | None, reason: str) -> bool:

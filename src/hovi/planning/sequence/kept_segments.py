@@ -87,6 +87,9 @@ def kept_in_segments(
 
 def _as_start(goal: End) -> End:
     """A goal as the start of what follows, a whole pose in the configuration chosen for it."""
-    if isinstance(goal, FrameGoal) and goal.rotation is not None and goal.position is not None:
-        return goal if goal.guess is None else State(np.asarray(goal.guess))
-    return goal
+    if not isinstance(goal, FrameGoal) or goal.guess is None:
+        return goal
+    whole = not goal.regional and all(
+        each.rotation is not None and each.position is not None for each in goal.parts
+    )
+    return State(np.asarray(goal.guess)) if whole else goal

@@ -6,9 +6,10 @@ import dataclasses
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import KW_ONLY, fields
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
+import numpy.typing as npt
 
 from hovi.checks.arguments import check_arguments_except
 from hovi.checks.kinds import is_number, shown
@@ -21,8 +22,9 @@ from hovi.effects import Effect
 from hovi.effects.registration import as_effects
 from hovi.errors import InputError
 from hovi.planning.problem.frame_goal import FrameGoal
+from hovi.planning.problem.goals import require_times
 from hovi.planning.problem.limits import Limits
-from hovi.planning.problem.notation.ends import End, as_end
+from hovi.planning.problem.notation.ends import End, are_frames, as_end
 from hovi.planning.search.job import stops_of
 from hovi.planning.search.options import PlanOptions
 from hovi.robot.robot import Robot
@@ -43,9 +45,9 @@ class Segment:
     """A segment of a sequence of motions, which `hovi.plan_sequence` plans together.
 
     goal: where it ends: a State, a configuration of shape (nq,) at rest, the name of a pose, a
-        FrameGoal, or a table as for `hovi.plan`. The motion stops there unless the goal gives
-        velocities or leaves them free (`free_velocity`), and it does not stop where there is none
-        (None).
+        FrameGoal, a list of them, or a table as for `hovi.plan`. The motion stops there unless the
+        goal gives velocities or leaves them free (`free_velocity`), and it does not stop where
+        there is none (None).
     duration: T in [s], or a text such as "1.5 s"; or a pair (lower, upper) of these for a free one.
     effects: what acts in this segment besides the effects of the scene, such as the payload that is
         carried, also as tables by name; one of a kind that the scene has takes its place.
@@ -73,8 +75,9 @@ class Segment:
             from hovi.conditions.kept.kinds import as_kept  # most segments keep nothing
 
             object.__setattr__(self, "keep", as_kept(self.keep))
-        if self.goal is not None and not isinstance(self.goal, State | FrameGoal | str | Mapping):
-            numbers_of("the goal of a segment", self.goal)
+        named = self.goal is None or isinstance(self.goal, State | FrameGoal | str | Mapping)
+        if not named and not are_frames(self.goal):
+            numbers_of("the goal of a segment", cast(npt.ArrayLike, self.goal))
         if self.limits is not None and not isinstance(self.limits, str | Limits | Mapping):
             raise InputError(
                 "the limits of a segment are 'urdf', 'none', the name of an arm, a mapping or a "
@@ -178,6 +181,7 @@ def checked_segments(segments: Any, options: PlanOptions) -> tuple[Segment, ...]
                     f"the goal of {name!r} takes no `{key}`, since accelerations are free where "
                     "segments meet: leave it out."
                 )
+    require_times(options.via)
     free = isinstance(duration_of(segments), tuple)
     if options.time_weight != 0 and not free:
         raise InputError(

@@ -65,4 +65,5 @@ def _as_start(goal: End, problem: TrajectoryProblem) -> State | None:
     q = keeping_turns(*known).q
     if isinstance(goal, State):
         return dataclasses.replace(goal, q=q, turns={})
-    return State(q, free=(ALL,), free_velocity=tuple(goal.free_velocity))
+    free = goal.free_velocities(problem.robot)
+    return State(q, problem.ends[1][1], free=(ALL,), free_velocity=free)

@@ -9,10 +9,11 @@ from functools import partial
 from typing import Any, ParamSpec, Protocol, cast
 
 from hovi.checks.arguments import check_arguments_except
-from hovi.discrete.measures.motion_segments import SEGMENT_NAMES
+from hovi.discrete.measures.motion_segments import SEGMENT_NAMES, motion_segments
 from hovi.errors import InputError, expect
+from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.notation.ends import End as Start
-from hovi.planning.problem.notation.ends import as_end
+from hovi.planning.problem.notation.ends import as_start
 from hovi.planning.refinement.faults.cautions import keeping_warnings
 from hovi.planning.search.continuation import STOPPED
 from hovi.planning.search.free_segments import FreeSegments
@@ -165,8 +166,34 @@ def _of_segments(
         if not found.success or (other.success and other.cost < found.cost):
             found, job = other, its_job
         found = dataclasses.replace(found, nit=steps)
+    if any(isinstance(goal, FrameGoal) and goal.regional for goal in goals):
+        found = _settled(found, scene, goals, checked, chosen, deadline, progress or silent, free)
     scenes = [each.acting.on(job.scene) for each in job.segments]
     return _named(with_notes(found, scenes, job.options, apart), checked)
+
+
+def _settled(
+    found: Solution,
+    scene: Scene,
+    goals: Sequence[End | None],
+    segments: Sequence[Segment],
+    options: PlanOptions,
+    deadline: Deadline,
+    progress: Progress,
+    free: FreeSegments,
+) -> Solution:
+    """The motion with the bounds of the regions of its goals settled. found: without."""
+    from hovi.planning.search.settled_regions import settled  # most goals are exact
+
+    def again(chosen: Sequence[FrameGoal], last: Solution) -> Solution:
+        assert last.problem is not None
+        left = iter(chosen)
+        new = [next(left) if isinstance(x, FrameGoal) and x.regional else x for x in goals]
+        times = [each.end - each.begin for each in motion_segments(last.trajectory)]
+        known = scene, last.problem.start, new, segments, options, deadline, progress, free
+        return _planned(*known, times, time.perf_counter())[0]
+
+    return settled(found, again)
 
 
 def _planned(
@@ -214,7 +241,7 @@ def _in_group(
     scene: Scene, start: Start, segments: Sequence[Segment], options: PlanOptions
 ) -> tuple[Scene, End, tuple[End | None, ...]]:
     """The scene, the start and the goals, of the chosen group of joints if there is one."""
-    begin = as_end(start, scene.robot, "start")
+    begin = as_start(start, scene.robot)
     whole = [
         dataclasses.replace(each, goal=with_others(each.goal, options.group, scene.robot, begin))
         for each in segments

@@ -159,6 +159,17 @@ class Solution(SolutionSummary):
                 problem = known._solved_problem
         return SolutionFactor.of(problem, known.trajectory.path, known.solved_bounds)
 
+    @property
+    def region_prices(self) -> dict[str, float]:
+        """By how much the cost changes with each bound of a goal's region, such as `within`.
+
+        dJ/dd of its room d, in [m] or [rad], by the frame and what is bounded; 0 for a bound inside
+        which the motion ends.
+        """
+        from hovi.planning.solver.regions import region_prices  # most goals have none
+
+        return region_prices(self)
+
     @cached_property
     def duration_derivative(self) -> float:
         """d cost / d T with all else fixed, per [s]: minus Pontryagin's Hamiltonian.

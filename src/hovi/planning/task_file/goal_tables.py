@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -11,9 +11,9 @@ import numpy as np
 from hovi.checks.units import seconds
 from hovi.discrete.grid import outside_motion
 from hovi.discrete.state import State
-from hovi.errors import HoviError, InputError
-from hovi.planning.problem.frame_goal import FrameGoal
-from hovi.planning.problem.goals import Via
+from hovi.errors import HoviError, InputError, SceneError
+from hovi.planning.problem.frame_goal import FrameGoal, all_of
+from hovi.planning.problem.goals import FREE, Via
 from hovi.planning.problem.notation.ends import END_KEYS, EndError, end_of
 from hovi.planning.problem.notation.via_points import require_no_rates
 from hovi.planning.search.group import with_others
@@ -34,6 +34,33 @@ class Begin(NamedTuple):
 
 
 NO_GROUP = Begin()
+
+
+def read_goal(
+    goal: EndTable | Sequence[EndTable],
+    keys: Keys,
+    robot: Robot,
+    toml: TomlText,
+    begin: Begin = NO_GROUP,
+) -> State | FrameGoal:
+    """As `read_end`, or from the tables of several frames."""
+    if isinstance(goal, EndTable):
+        return read_end(goal, keys, robot, toml, begin)
+    found = list[FrameGoal]()
+    for number, table in enumerate(goal):
+        each = read_end(table, (*keys, number), robot, toml, begin)
+        if not isinstance(each, FrameGoal):
+            name = spelled((*keys, number))
+            raise toml.error(
+                (*keys, number), f"`{name}` needs a `frame`: several goals are of frames"
+            )
+        found.append(each)
+    try:
+        whole = all_of(found)
+        whole.check(robot)
+    except InputError as wrong:
+        raise toml.error(keys, str(wrong)) from None
+    return whole
 
 
 def read_end(
@@ -103,7 +130,7 @@ def read_via(
     points = []
     for i, table in enumerate(tables):
         longest, time = float(np.max(duration)), _time(table.time, ("via", i, "time"), toml)
-        if time >= longest:
+        if np.isfinite(time) and time >= longest:
             sentence = outside_motion(time, longest)
             raise toml.error(("via", i, "time"), sentence)
         try:
@@ -119,15 +146,28 @@ def read_via(
 
 
 def _time(given: float | str, keys: Keys, toml: TomlText) -> float:
+    if given == FREE:
+        return np.inf
     try:
         return seconds(given, "the time of a via point")
     except InputError as wrong:
         raise toml.error(keys, str(wrong)) from None
 
 
+def goal_value(goal: State | FrameGoal, robot: Robot) -> dict[str, Any] | list[dict[str, Any]]:
+    """The table of a goal, or those of several frames."""
+    return state_table(goal, robot, "goal") if isinstance(goal, State) else goal.to_tables()
+
+
 def end_table(goal: State | FrameGoal, robot: Robot, name: str) -> dict[str, Any]:
     """The table from which `read_end` reads a start or a goal. name: of it in messages."""
-    return state_table(goal, robot, name) if isinstance(goal, State) else goal.to_table()
+    if isinstance(goal, State):
+        return state_table(goal, robot, name)
+    if goal.also:
+        raise SceneError(
+            f"scene files have one frame for each {name}: give goals of several frames to segments."
+        )
+    return goal.to_table()
 
 
 def via_table(via: Via, robot: Robot) -> dict[str, Any]:
@@ -135,7 +175,7 @@ def via_table(via: Via, robot: Robot) -> dict[str, Any]:
     table = end_table(via.goal, robot, "via")
     if isinstance(via.goal, State) and via.goal.v is not None:
         table["v"] = _floats(via.goal.on(robot, "via")[1])
-    return {"time": float(via.time), **table}
+    return {"time": float(via.time) if via.timed else FREE, **table}
 
 
 def state_table(state: State, robot: Robot, name: str) -> dict[str, Any]:

@@ -40,7 +40,7 @@ def json_schema() -> dict[str, Any]:
     own: dict[str, Any] = {
         "effects": (simulated, Field(default=None, description="tables of effects")),
         "limits": (limits | None, SegmentTable.model_fields["limits"]),
-        "goal": (GoalTable | Bare | None, SegmentTable.model_fields["goal"]),
+        "goal": (GoalTable | list[GoalTable] | Bare | None, SegmentTable.model_fields["goal"]),
     }
     segment = create_model("Segment", __base__=SegmentTable, __doc__="[[segments]].", **own)
     keys: dict[str, Any] = {
@@ -51,7 +51,7 @@ def json_schema() -> dict[str, Any]:
         "segments": (list[segment], TaskTable.model_fields["segments"]),  # type: ignore[valid-type]
         "limits": (limits, Field(default="urdf", description="what bounds the motion")),
         "start": (StartTable | Bare, TaskTable.model_fields["start"]),
-        "goal": (GoalTable | Bare | None, TaskTable.model_fields["goal"]),
+        "goal": (GoalTable | list[GoalTable] | Bare | None, TaskTable.model_fields["goal"]),
         "obstacles": (list[_Entries] | _Entries, TaskTable.model_fields["obstacles"]),
         "keep": (list[_Entries] | _Entries, TaskTable.model_fields["keep"]),
         "grasped": (list[GraspedTable] | GraspedTable, TaskTable.model_fields["grasped"]),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any, get_args
 
@@ -137,13 +137,19 @@ def _model_at(model: type[BaseModel], keys: Keys) -> type[BaseModel] | None:
             continue  # into a list of tables, whose class is known
         field = model.model_fields.get(key)
         annotation = field.annotation if field else None
-        members = (getattr(each, "__origin__", each) for each in get_args(annotation))
-        kinds = [kind for kind in (annotation, *members) if isinstance(kind, type)]
-        tables = [kind for kind in kinds if issubclass(kind, BaseModel)]
+        tables = [kind for kind in _kinds(annotation) if issubclass(kind, BaseModel)]
         if not tables:
             return None
         model = tables[0]
     return model
+
+
+def _kinds(annotation: Any) -> Iterator[type]:
+    """The types that an annotation names, itself or in unions and lists."""
+    if isinstance(annotation, type):
+        yield annotation
+    for each in get_args(annotation):
+        yield from _kinds(each)
 
 
 def _fields_of(model: type[BaseModel] | None) -> list[str]:

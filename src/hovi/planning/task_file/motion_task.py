@@ -84,7 +84,7 @@ def _goal(motion: Trajectory) -> State | FrameGoal:
     Raises InputError for a table in the motion that is none of a goal.
     """
     asked, robot, last = motion.metadata.get(ASKED_GOAL), motion.robot, _state(motion, -1)
-    if not isinstance(asked, dict) or robot is None:
+    if not isinstance(asked, dict | list) or robot is None:
         return last
     goal = as_end(asked, robot, "goal")
     return dataclasses.replace(goal, guess=motion.q[-1]) if isinstance(goal, FrameGoal) else last

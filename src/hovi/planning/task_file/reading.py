@@ -20,7 +20,7 @@ from hovi.planning.problem.tolerance import Tolerance
 from hovi.planning.search.options import INTERVALS_TWICE, TOLERANCE_AND_SCHEME, PlanOptions
 from hovi.planning.sequence.segment import duration_of
 from hovi.planning.task_file.effect_tables import read_effects
-from hovi.planning.task_file.goal_tables import Begin, read_end, read_via
+from hovi.planning.task_file.goal_tables import Begin, read_end, read_goal, read_via
 from hovi.planning.task_file.limit_tables import read_limits
 from hovi.planning.task_file.messages import TomlText, first_sentence
 from hovi.planning.task_file.scene_cache import (
@@ -93,7 +93,7 @@ def task_of(data: Mapping[str, Any], toml: TomlText, cache: SceneCache | None = 
         return dataclasses.replace(task, note=note)
     assert table.goal is not None
     duration = _duration(table.duration, toml)
-    goal = read_end(table.goal, ("goal",), held, toml, begin)
+    goal = read_goal(table.goal, ("goal",), held, toml, begin)
     without = MOTION_KEYS[:2] if table.via else MOTION_KEYS  # via points are before its end
     options = kept.get(
         "options",
@@ -291,6 +291,7 @@ def _load_robot(table: ShapedTable, toml: TomlText) -> Robot:
             free_flyer=table.free_flyer,
             mimic=table.mimic,
             locked=table.locked,
+            tools=table.tools,
             srdf=None if table.srdf is None else folder / table.srdf,
         )
     except HoviError as refused:

@@ -11,7 +11,7 @@ Built = TypeVar("Built")
 
 MOST = 16
 """How many of each kind are kept; those that were not used for the longest time are dropped."""
-ROBOT_KEYS = ("robot", "locked", "package_dirs", "srdf", "free_flyer", "mimic")
+ROBOT_KEYS = ("robot", "locked", "package_dirs", "srdf", "free_flyer", "mimic", "tools")
 """The keys of a scene file that say which robot it is."""
 SCENE_KEYS = (*ROBOT_KEYS, "passive", "begin", "effects")
 """The keys that say which scene it is."""

@@ -19,9 +19,10 @@ from pydantic import (
     create_model,
 )
 
-from hovi.checks.units import DURATION_IN_WORDS, SECONDS_IN_WORDS
+from hovi.checks.units import DURATION_IN_WORDS
 from hovi.planning.obstacles.obstacle import GRASPED_KEYS
 from hovi.planning.problem.arms.limit_set import LimitSetName
+from hovi.planning.problem.notation.via_points import TIME_IN_WORDS
 from hovi.planning.search.option_fields import SceneKey, option_infos
 from hovi.planning.search.options import MAX_INTERVALS, PlanOptions
 
@@ -155,6 +156,15 @@ class EndTable(Table):
     axis: AxisTable | None = Field(
         default=None, description="a table with two directions, `frame` and `world`"
     )
+    within: Any = Field(default=None, description='a length, such as "10 mm", or a list of three')
+    within_angle: Any = Field(default=None, description='an angle, such as "5 deg"')
+    velocity: Direction | None = Field(
+        default=None, description="a list of three finite numbers, in m/s"
+    )
+    angular_velocity: Direction | None = Field(
+        default=None, description="a list of three finite numbers, in rad/s"
+    )
+    box_frame: str | None = Field(default=None, description="the name of a frame of the robot")
 
 
 class StartTable(EndTable):
@@ -171,6 +181,8 @@ class GoalTable(EndTable):
 
 def _with_q(given: Any) -> Any:
     """The table of an end from a configuration that is given by itself, as Python takes it."""
+    if isinstance(given, list) and given and all(isinstance(each, dict) for each in given):
+        return given
     if isinstance(given, str | list):
         return {"q": given}
     by_joint = isinstance(given, dict) and given and not given.keys() & GoalTable.model_fields
@@ -183,19 +195,27 @@ def _listed(given: Any) -> Any:
 
 
 Start = Annotated[StartTable, BeforeValidator(_with_q)]
-Goal = Annotated[GoalTable | None, BeforeValidator(_with_q)]
+Goal = Annotated[
+    Annotated[
+        Annotated[GoalTable, Tag("<table>")] | Annotated[list[GoalTable], Tag("<list>")],
+        Discriminator(_kind),
+    ]
+    | None,
+    BeforeValidator(_with_q),
+]
 Bare = list[FiniteFloat] | dict[str, FiniteFloat | list[FiniteFloat]] | str
 """A configuration by itself in place of the table of an end."""
 _END = (
     "a list of finite numbers, a table of joint names, the name of a pose, or a table {} with q "
     "and, if moving, v, or with a frame and its target"
 )
+_FRAMES = "; or tables [{}], one for each of several frames at once"
 
 
 class ViaTable(GoalTable):
     """[[via]]."""
 
-    time: PositiveSeconds = Field(description=SECONDS_IN_WORDS)
+    time: PositiveSeconds | Literal["free"] = Field(description=TIME_IN_WORDS)
 
 
 class SegmentTable(Table):
@@ -203,7 +223,10 @@ class SegmentTable(Table):
 
     name: str = Field(default="", description="a text")
     duration: PositiveDuration = Field(description=DURATION_IN_WORDS)
-    goal: Goal = Field(default=None, description=_END.format("[segments.goal]"))
+    goal: Goal = Field(
+        default=None,
+        description=(_END + _FRAMES).format("[segments.goal]", "[segments.goal]"),
+    )
     limits: Any = Field(
         default=None, description='"urdf", "soft", "none", the name of an arm or a table of limits'
     )
@@ -289,6 +312,9 @@ class ShapedTable(Table):
         default=None, description="true or false; by default as the example robot's loader says"
     )
     mimic: bool = Field(default=False, description="true or false")
+    tools: dict[str, dict[str, Any]] = Field(
+        default={}, description="tables [tools.NAME] with a frame, and position and rpy in it"
+    )
     passive: list[str] = Field(default=[], description="a list of joint names")
     begin: float = Field(default=0.0, allow_inf_nan=False, description="a time in seconds")
     duration: Duration | None = Field(default=None, description=DURATION_IN_WORDS)
@@ -309,7 +335,7 @@ class ShapedTable(Table):
         default=[], description="tables [[keep]], or one table [keep], with a kind each"
     )
     start: Start = Field(description=_END.format("[start]"))
-    goal: Goal = Field(default=None, description=_END.format("[goal]"))
+    goal: Goal = Field(default=None, description=(_END + _FRAMES).format("[goal]", "[goal]"))
     segments: list[SegmentTable] = Field(
         default=[], description="tables [[segments]] with a duration and a goal each"
     )

@@ -15,7 +15,7 @@ from hovi.planning.sequence.segment import (
     names_of,
 )
 from hovi.planning.task_file.effect_tables import effect_table, read_effects
-from hovi.planning.task_file.goal_tables import NO_GROUP, Begin, end_table, read_end
+from hovi.planning.task_file.goal_tables import NO_GROUP, Begin, goal_value, read_goal
 from hovi.planning.task_file.limit_tables import limits_value, read_limits
 from hovi.planning.task_file.messages import TomlText
 from hovi.planning.task_file.schema import SegmentTable, ShapedTable, TaskTable
@@ -60,7 +60,7 @@ def _read_segment(
     except InputError as wrong:
         raise toml.error((*keys, "duration"), str(wrong)) from None
     return Segment(
-        None if goal is None else read_end(goal, (*keys, "goal"), robot, toml, begin),
+        None if goal is None else read_goal(goal, (*keys, "goal"), robot, toml, begin),
         duration,
         effects=read_effects(table.effects, robot, toml, keys),
         limits=None if limits is None else read_limits(limits, robot, toml, (*keys, "limits")),
@@ -91,7 +91,7 @@ def _segment_table(segment: Segment, name: str, robot: Robot) -> dict[str, Any]:
     if segment.limits is not None:
         table["limits"] = limits_value(segment.limits, robot)
     if segment.goal is not None:
-        table["goal"] = end_table(as_end(segment.goal, robot, name), robot, name)
+        table["goal"] = goal_value(as_end(segment.goal, robot, name), robot)
     if segment.keep:
         from hovi.planning.task_file.keep_tables import keep_table
 

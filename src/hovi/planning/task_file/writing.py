@@ -15,7 +15,7 @@ from hovi.planning.problem.tolerance import as_number_or_text
 from hovi.planning.search.option_fields import option_infos
 from hovi.planning.search.options import PlanOptions
 from hovi.planning.task_file.effect_tables import effect_table
-from hovi.planning.task_file.goal_tables import end_table, via_table
+from hovi.planning.task_file.goal_tables import end_table, goal_value, via_table
 from hovi.planning.task_file.limit_tables import limits_value
 from hovi.planning.task_file.obstacle_tables import obstacle_table
 from hovi.planning.task_file.schema import FORMAT, PLAIN
@@ -27,7 +27,18 @@ from hovi.robot.srdf import read_srdf_file
 from hovi.schemes import by_name
 from hovi.system.files import make_folders, reason, whole_file
 
-_TABLES = ("limits", "start", "goal", "segments", "via", "keep", "obstacles", "grasped", "scheme")
+_TABLES = (
+    "tools",
+    "limits",
+    "start",
+    "goal",
+    "segments",
+    "via",
+    "keep",
+    "obstacles",
+    "grasped",
+    "scheme",
+)
 """Keys that may hold tables, in the order in which the tables are written."""
 _EMPTY: tuple[Any, ...] = (None, [], {})
 
@@ -70,7 +81,7 @@ def _document(task: Task, folder: Path | None) -> tomlkit.TOMLDocument:
         "duration": None if task.segments else _duration(task.duration),
         **_option_keys(task, folder),
         "start": end_table(task.start, robot, "start"),
-        "goal": None if task.segments else end_table(task.goal, robot, "goal"),
+        "goal": None if task.segments else goal_value(task.goal, robot),
         "segments": segments_value(task.segments, robot),
     }
     plain = {key: value for key, value in keys.items() if not _is_table(value)}
@@ -97,6 +108,7 @@ def _robot_keys(task: Task, folder: Path | None) -> dict[str, Any]:
         "srdf": None if _own_srdf(source) is None else _srdf_name(source),
         "free_flyer": _free_flyer(source),
         "mimic": source.mimic or None,
+        "tools": {each.name: each.to_dict() for each in source.tools},
         "passive": list(task.scene.passive),
         "begin": float(task.scene.begin) or None,
     }

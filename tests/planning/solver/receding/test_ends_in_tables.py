@@ -163,7 +163,8 @@ def test_times_may_be_texts(planned: hovi.Solution) -> None:
         ({"frame": "tool9", "position": HAND}, "tool9"),
         ({"position": HAND}, "needs a `frame`"),
         ({"elbow_joint": 0.3}, "leaves out joint"),
-        ({"q": Q, "velocity": Q}, "unknown key `goal.velocity`"),
+        ({"q": Q, "speed": Q}, "unknown key `goal.speed`"),
+        ({"q": Q, "velocity": Q}, "`velocity` needs a `frame`: velocities of joints are `v`"),
         ("default", "pose"),
     ],
 )

@@ -8,6 +8,8 @@ ones; and ends when a number of seeds in a row have led to no new configuration.
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -18,10 +20,12 @@ from hovi.dynamics.kinematic_chain import KinematicChain, read_kinematic_chain
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.kinematics.damped_newton import candidates, inside
 from hovi.robot.robot import Robot
+from hovi.robot.tip_frame import moves_frame
 from hovi.system.dataclass import dataclass
 from hovi.system.deadline import raise_if_late
 
 Array = npt.NDArray[np.float64]
+Mask = npt.NDArray[np.bool_]
 
 PATIENCE = 60
 """Seeds in a row without a new configuration after which the search ends."""
@@ -71,6 +75,10 @@ def find_branches(
     """
     raise_if_late()
     near = inside(robot, near, *bounds)
+    if any(each.sides for each in goal.parts) and max(goal.miss(robot, near)) <= PYTHON_TOLERANCE:
+        return Branches(near[None], near)  # where a plan before ended
+    if goal.also:
+        return _of_several(robot, goal.middle, near, bounds, most, seeds)
     lower, upper = bounds
     compiled = _compiled(robot, goal.frame, lower.tobytes(), upper.tobytes())
     if compiled is None:
@@ -92,7 +100,48 @@ def find_branches(
         best=best,
     )
     q = chain.configurations(np.vstack([found[:count], best]), near)
-    return Branches(q[:-1], q[-1])
+    within = count == 0 and goal.regional and max(goal.miss(robot, q[-1])) == 0.0
+    return Branches(q if within else q[:-1], q[-1])
+
+
+def _of_several(
+    robot: Robot, goal: FrameGoal, near: Array, bounds: tuple[Array, Array], most: int, seeds: int
+) -> Branches:
+    """Those of several frames: all pairs of what frames reach that have no joint in common.
+
+    Frames that joints move together are searched for together, in Python, first from where each of
+    them is at its own goal.
+    """
+    best = np.zeros(robot.nv)
+    moves: Array = np.zeros((1, robot.nv))
+    for parts in _apart(robot, goal.parts):
+        if len(parts) == 1:
+            alone = parts[0].alone
+            found = find_branches(robot, alone, near, bounds, most, seeds)
+        else:
+            each = (part.alone for part in parts)
+            known = [q for x in each for q in find_branches(robot, x, near, bounds, most, seeds).q]
+            together = replace(parts[0], also=parts[1:])
+            found = _in_python(robot, together, near, bounds, most, seeds, known)
+        own = robot.difference(near, found.q)
+        moves = (moves[:, None] + own[None]).reshape(-1, robot.nv)
+        moves = moves[np.argsort(np.linalg.norm(moves, axis=1), kind="stable")][:most]
+        best += own[0] if len(own) else robot.difference(near, found.best)
+    q = np.array([robot.integrate(near, each) for each in moves]).reshape(-1, robot.nq)
+    return Branches(q, q[0] if len(q) else robot.integrate(near, best))
+
+
+def _apart(robot: Robot, parts: Sequence[FrameGoal]) -> list[list[FrameGoal]]:
+    """The goals, those whose frames a joint moves together in one list."""
+    groups = list[tuple[list[FrameGoal], Mask]]()
+    for part in parts:
+        own, moved = [part], moves_frame(robot.model, part.frame)
+        common = [each for each in groups if (each[1] & moved).any()]
+        groups = [each for each in groups if not (each[1] & moved).any()]
+        for others, mask in common:
+            own, moved = [*others, *own], moved | mask
+        groups.append((own, moved))
+    return [own for own, _ in groups]
 
 
 @lru_cache(maxsize=64)
@@ -117,13 +166,19 @@ def _beyond_reach(chain: KinematicChain, goal: FrameGoal) -> bool:
 
 
 def _in_python(
-    robot: Robot, goal: FrameGoal, near: Array, bounds: tuple[Array, Array], most: int, seeds: int
+    robot: Robot,
+    goal: FrameGoal,
+    near: Array,
+    bounds: tuple[Array, Array],
+    most: int,
+    seeds: int,
+    known: Sequence[Array] = (),
 ) -> Branches:
-    """The same without the compiled search."""
+    """The same without the compiled search. known: configurations to begin from after `near`."""
     apart = ISOLATED if robot.nv <= goal.equations else IN_A_FAMILY
     found: list[Array] = []
     best, least, since = near, np.inf, 0
-    for q in itertools.islice(candidates(robot, goal, near, *bounds), seeds):
+    for q in itertools.islice(candidates(robot, goal, near, *bounds, known), seeds):
         error, since = sum(goal.miss(robot, q)), since + 1
         if error < least:
             best, least = q, error

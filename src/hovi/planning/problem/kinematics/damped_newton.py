@@ -6,7 +6,8 @@ other joints.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import itertools
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -39,15 +40,22 @@ MAX_STALLED_STEPS = 8
 
 
 def candidates(
-    robot: Robot, goal: FrameGoal, near: Array, lower: Array, upper: Array
+    robot: Robot,
+    goal: FrameGoal,
+    near: Array,
+    lower: Array,
+    upper: Array,
+    known: Sequence[Array] = (),
 ) -> Iterator[Array]:
     """Where the search from each seed ends: configurations (nq,), whether or not they reach a goal.
 
     near: the first seed, shape (nq,).
     lower, upper: position limits, shape (nv,), applied to joints whose q is a plain number.
+    known: further seeds, which come after the first.
     """
     difference = goal.difference(robot)
-    for seed in seeds(robot, near, lower, upper):
+    others = itertools.islice(seeds(robot, near, lower, upper), 1, None)
+    for seed in itertools.chain([near], known, others):
         raise_if_late()
         yield _newton(robot, difference, inside(robot, seed, lower, upper), lower, upper)
 

@@ -8,24 +8,25 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.robot.robot import Robot
-from hovi.robot.tip_frame import moves_frame
 
 Array = npt.NDArray[np.float64]
+Mask = npt.NDArray[np.bool_]
 
 TURNED = 2
 """Largest number of joints that are turned at once."""
 
 
 def with_full_turns(
-    robot: Robot, frame: str, q: Array, near: Array, bounds: tuple[Array, Array]
+    robot: Robot, moving: Mask, q: Array, near: Array, bounds: tuple[Array, Array]
 ) -> Array:
     """A configuration, then those with up to TURNED joints a full turn further, (M, nq).
 
     Each joint turns in the direction in which it stays within its limits; where it may turn in
     both, in the one that ends nearer to `near`.
-    frame: which the joints move. q, near: shape (nq,). bounds: of positions, shape (nv,).
+    moving: the entries of v that may turn, (nv,). q, near: shape (nq,). bounds: of positions,
+        shape (nv,).
     """
-    turns = _turns(robot, frame, q, near, bounds)
+    turns = _turns(robot, moving, q, near, bounds)
     joints = np.flatnonzero(turns)
     chosen = [each for count in range(TURNED + 1) for each in combinations(joints, count)]
     found = np.tile(q, (len(chosen), 1))
@@ -34,11 +35,11 @@ def with_full_turns(
     return found
 
 
-def _turns(robot: Robot, frame: str, q: Array, near: Array, bounds: tuple[Array, Array]) -> Array:
+def _turns(robot: Robot, moving: Mask, q: Array, near: Array, bounds: tuple[Array, Array]) -> Array:
     """The full turn of each entry of q that is allowed, in [rad]; 0 for none, shape (nq,)."""
     positions, velocities = robot.space.plain
     lower, upper = (side[velocities] for side in bounds)
-    angles = moves_frame(robot.model, frame)[velocities] & ~robot.sliding[velocities]
+    angles = moving[velocities] & ~robot.sliding[velocities]
     sides = np.array([[-2 * np.pi], [2 * np.pi]])
     there = q[positions] + sides
     allowed = angles & (there >= lower) & (there <= upper)

@@ -11,6 +11,9 @@ from hovi.errors import InputError
 from hovi.planning.problem.goals import Via
 from hovi.planning.problem.notation.ends import EndError, end_of
 
+TIME_IN_WORDS = f'{SECONDS_IN_WORDS}, or "free"'
+"""What the time of a via point is, in messages about scene files and in Python."""
+
 
 def as_via(given: Any, number: int) -> Via:
     """A via point from a Via, or from a table as [[via]] in a scene file. Raises InputError."""
@@ -23,7 +26,7 @@ def as_via(given: Any, number: int) -> Via:
         )
     name, table = f"via[{number}]", dict(given)
     if "time" not in table:
-        raise EndError(f"`{name}.time` is missing; it must be {SECONDS_IN_WORDS}.", "time")
+        raise EndError(f"`{name}.time` is missing; it must be {TIME_IN_WORDS}.", "time")
     time = table.pop("time")
     require_no_rates(table)
     return Via(time, end_of(table, name))

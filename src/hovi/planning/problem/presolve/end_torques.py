@@ -40,7 +40,7 @@ def held_still_at(problem: TrajectoryProblem, limits: Limits, end: int) -> Itera
         tau = _static(scene, q[None], end * problem.grid.duration)
         yield from _excess(problem, scene, tau, here, f"at the {('start', 'goal')[end]}")
     goal = problem.goal
-    if end == 1 and isinstance(goal, FrameGoal) and not goal.free_velocity:
+    if end == 1 and isinstance(goal, FrameGoal) and goal.exact and not goal.free_velocity:
         yield from _at_frame_goal(problem, goal, here)
 
 

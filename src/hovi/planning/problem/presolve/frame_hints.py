@@ -39,6 +39,11 @@ def reach_of(robot: Robot) -> float:
 
 def hint_on_frame(robot: Robot, goal: FrameGoal) -> str:
     """The likely reason why no configuration reaches a goal, as a clause; "" for none."""
+    return next(filter(None, (_hint_on_one(robot, each) for each in goal.parts)), "")
+
+
+def _hint_on_one(robot: Robot, goal: FrameGoal) -> str:
+    """That of the goal's own frame."""
     if goal.position is not None:
         position = np.asarray(goal.position)
         unit, metres = _likely_unit(float(np.linalg.norm(position)), reach_of(robot))
@@ -48,9 +53,10 @@ def hint_on_frame(robot: Robot, goal: FrameGoal) -> str:
                 f"{_shown(metres * position)} m"
             )
     joints = int(moves_frame(robot.model, goal.frame).sum())
-    if goal.equations > joints:
+    equations = goal.equations - sum(each.equations for each in goal.also)
+    if equations > joints:
         return (
-            f"it prescribes {goal.equations} coordinates of frame {goal.frame!r}, which only "
+            f"it prescribes {equations} coordinates of frame {goal.frame!r}, which only "
             f"{joints} joint coordinate{'s' * (joints > 1)} move{'s' * (joints == 1)}: prescribe a "
             "position or an axis alone, or leave the goal's joints to a State"
         )

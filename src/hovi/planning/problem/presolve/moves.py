@@ -23,7 +23,6 @@ from hovi.planning.problem.presolve.least_time import Pace, Rests
 from hovi.planning.problem.presolve.reach_in_boxes import proven_out_of_reach
 from hovi.robot.robot import Robot
 from hovi.robot.space.coordinates import Coordinates
-from hovi.robot.tip_frame import moves_frame
 from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
@@ -58,7 +57,8 @@ class Waypoint:
         if inner and (isinstance(goal, FrameGoal) or goal.v is None):
             return np.zeros(on.nv, dtype=bool)
         if isinstance(goal, FrameGoal):
-            free = State(np.zeros(0), free_velocity=tuple(goal.free_velocity))
+            assert isinstance(on, Robot)
+            free = State(np.zeros(0), free_velocity=goal.free_velocities(on))
             return np.asarray(~free.free_on(on, self.name)[1])
         return np.asarray((goal.on(on, self.name)[1] == 0.0) & ~goal.free_on(on, self.name)[1])
 
@@ -193,7 +193,7 @@ class _FrameMove(Move):
         goal = self._other.goal
         assert isinstance(goal, FrameGoal)
         q, held = self.known.position(robot)
-        if not held[moves_frame(robot.model, goal.frame)].all():
+        if goal.regional or not held[goal.moves(robot)].all():
             return None
         bounds = self.limits.lower[0], self.limits.upper[0]
         found = find_branches(robot, goal, q, bounds, BRANCHES, SEEDS).q
@@ -209,8 +209,9 @@ class _FrameMove(Move):
         advice = f"increase the {'duration' if self.whole else 'time'} or the limits"
         move = f"move from the {self.first.name} to the {self.last.name} within {self.time:.4g} s"
         if self._proven(goal, q):
-            return Finding(f"frame {goal.frame!r} cannot {move}: {nearest}; {advice}", True)
-        what = f"frame {goal.frame!r} has to {move}, but {nearest}: probably no motion exists"
+            return Finding(f"{goal.frames} cannot {move}: {nearest}; {advice}", True)
+        has = "have" if goal.also else "has"
+        what = f"{goal.frames} {has} to {move}, but {nearest}: probably no motion exists"
         return Finding(f"{what}; {advice}", False)
 
     @property
@@ -233,6 +234,10 @@ class _FrameMove(Move):
         return longest
 
     def _proven(self, goal: FrameGoal, q: Array) -> bool:
+        """Whether one of the frames cannot reach its goal in time."""
+        return any(self._proven_of(each, q) for each in goal.parts)
+
+    def _proven_of(self, goal: FrameGoal, q: Array) -> bool:
         chain = read_kinematic_chain(self.coordinates.model, goal.frame)
         if chain is None:
             return False
