@@ -566,4 +566,4 @@ def _rotation(value: npt.ArrayLike) -> Array:
 
 
 def _norm(x: npt.ArrayLike) -> float:
-    return float(np.linalg.norm(np.asarray(x)))
+    return math.hypot(*np.asarray(x))
