@@ -1,4 +1,4 @@
-"""Straight lines with the tool's rotation kept: hovi beside roboplan's Cartesian planner.
+"""Straight lines with the tool's rotation kept: hovi next to roboplan's Cartesian planner.
 
 roboplan follows the line by inverse kinematics and times it by TOPP-RA within limits on velocities
 and accelerations; hovi plans the least effort in the same time, and in 1.3 times of it, within the
@@ -137,9 +137,9 @@ def main() -> None:
     print_machine(threads=1)
 
 
-def row(name: str, runs: list[dict[str, float]], beside: list[dict[str, float]]) -> list[str]:
-    """A row of the table; beside: what efforts are relative to."""
-    good = [(a, b) for a, b in zip(runs, beside, strict=True) if "T" in a and "T" in b]
+def row(name: str, runs: list[dict[str, float]], others: list[dict[str, float]]) -> list[str]:
+    """A row of the table; others: what efforts are relative to."""
+    good = [(a, b) for a, b in zip(runs, others, strict=True) if "T" in a and "T" in b]
     return [
         name,
         f"{len(good)} of {len(runs)}",

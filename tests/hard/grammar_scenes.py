@@ -96,6 +96,15 @@ END = {
     "quaternion_xyzw": _row([0.0, 0.0, 0.0, 1.0]),
     "axis": {"frame": VECTOR, "world": VECTOR},
 }
+REGION = {
+    **{key: END[key] for key in ("frame", "position", "axis")},
+    "within": _row(
+        *(0.01, "10 mm", [0.01, "5 mm", 0.02]),
+        **{"types": "integer float text list", "items": "integer float text"},
+    ),
+    "within_angle": _leaf(0.1, "5 deg", types="integer float text"),
+    "velocity": VECTOR,
+}
 SHAPES: tuple[dict[str, Any], ...] = (
     {"kind": "sphere", "position": VECTOR, "radius": _leaf(0.1)},
     {"kind": "box", "position": VECTOR, "size": _row([0.1, 0.2, 0.3]), "rpy": VECTOR},
@@ -232,13 +241,20 @@ def _grammar(random: Random) -> dict[str, Any]:
             1.0, "1 s", [0.5, 1.0], items="integer float text", types="integer float text list"
         ),
         "start": ends,
-        "goal": random.choice((ends, framed, {**ends, "free": NAMES, "free_velocity": NAMES})),
+        "goal": random.choice(
+            (
+                *(ends, framed, {**ends, "free": NAMES, "free_velocity": NAMES}),
+                *(REGION, [REGION, framed | {"frame": _leaf("upper_arm", types="text")}]),
+            )
+        ),
         "scheme": {
             "name": _leaf("galerkin-2", types="text"),
             "intervals": _leaf(4, types="integer"),
         },
         "effects": {key: EFFECTS[key] for key in random.sample([*EFFECTS], random.randint(0, 2))},
     }
+    if random.random() < 0.2:
+        chosen["tools"] = {"tcp": {"frame": FRAME, "position": VECTOR, "rpy": VECTOR}}
     for key in random.sample([*OPTIONS], random.randint(0, 2)):
         chosen[key] = OPTIONS[key]
     shape = random.choice(SHAPES)

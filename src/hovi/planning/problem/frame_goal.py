@@ -597,7 +597,7 @@ def _rotation(value: npt.ArrayLike) -> Array:
 
 
 def _norm(x: npt.ArrayLike) -> float:
-    return float(np.linalg.norm(np.asarray(x)))
+    return math.hypot(*np.asarray(x))
 
 
 def _floats(values: Any) -> list[float]:

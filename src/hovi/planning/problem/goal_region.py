@@ -20,6 +20,7 @@ import casadi as ca
 import numpy as np
 import numpy.typing as npt
 
+from hovi.checks.kinds import is_number
 from hovi.checks.units import angle, length
 from hovi.errors import InputError
 from hovi.system.dataclass import dataclass
@@ -96,7 +97,7 @@ def angle_of(within: Any) -> float:
 
 
 def _is_zero(given: Any) -> bool:
-    return isinstance(given, int | float) and float(given) == 0.0
+    return is_number(given) and float(given) == 0.0
 
 
 def held(middle: ca.SX, turn: ca.SX, bounds: Sequence[Bound], sides: Sequence[Side]) -> ca.SX:

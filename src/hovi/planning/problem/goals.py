@@ -65,7 +65,7 @@ class Via:
                 f"the goal of a via point must be a hovi.State(q) or a hovi.FrameGoal, got "
                 f"{self.goal!r}."
             )
-        free = self.time in (FREE, np.inf)
+        free = isinstance(self.time, str | float) and self.time in (FREE, np.inf)
         time = np.inf if free else seconds(self.time, "the time of a via point")
         object.__setattr__(self, "time", time)
         if not (free or (np.isfinite(time) and time > 0)):

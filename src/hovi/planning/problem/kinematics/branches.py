@@ -8,6 +8,7 @@ ones; and ends when a number of seeds in a row have led to no new configuration.
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
@@ -162,7 +163,7 @@ def _beyond_reach(chain: KinematicChain, goal: FrameGoal) -> bool:
     if goal.position is None:
         return False
     first = chain.translations[0]
-    return bool(np.linalg.norm(np.asarray(goal.position) - first) > chain.reach + GOAL_TOLERANCE)
+    return math.dist(np.asarray(goal.position), first) > chain.reach + GOAL_TOLERANCE
 
 
 def _in_python(

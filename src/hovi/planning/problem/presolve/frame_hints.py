@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from hovi.planning.problem.frame_goal import FrameGoal
@@ -46,7 +48,7 @@ def _hint_on_one(robot: Robot, goal: FrameGoal) -> str:
     """That of the goal's own frame."""
     if goal.position is not None:
         position = np.asarray(goal.position)
-        unit, metres = _likely_unit(float(np.linalg.norm(position)), reach_of(robot))
+        unit, metres = _likely_unit(math.hypot(*position), reach_of(robot))
         if unit:
             return (
                 f"its position {_shown(position)} m looks like {unit}, which are "
