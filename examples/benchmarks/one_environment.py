@@ -67,7 +67,9 @@ LIBRARIES = {
         "mujoco",
         "import mujoco",
         """
-model = mujoco.MjModel.from_xml_path(path)
+spec = mujoco.MjSpec.from_file(path)  # a link without inertia would get that of its shape
+spec.compiler.inertiafromgeom = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_FALSE
+model = spec.compile()
 model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT  # contacts of links that meet
 data, tau = mujoco.MjData(model), []
 for q, v, a in rows:

@@ -15,7 +15,7 @@ TOP = Path(__file__).resolve().parents[2]
 BLOCK = re.compile(
     r"(?:^<!-- (?P<mark>[^\n]*) -->\n)?^```(?P<language>\w+)\n(?P<code>.*?)^```$", re.M | re.S
 )
-INSTALLING = re.compile(r"^python3 -m venv \S+ && \S+/pip install \S+ && ", re.M)
+INSTALLING = re.compile(r"^python3 -m venv \S+ && \S+/pip install (?:-v )?\S+ && ", re.M)
 LANGUAGES = "python", "sh", "toml", "text"
 NOT_RUN, PART = "not run: ", "part of "
 """What a comment above a block begins with: why it is not run, and the scene that it belongs to."""

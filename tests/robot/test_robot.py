@@ -3,6 +3,7 @@ from __future__ import annotations
 import json
 import pickle
 import re
+import sys
 from pathlib import Path
 
 import coal
@@ -304,7 +305,9 @@ def test_a_path_that_no_mesh_can_have_is_reported(mesh: str, package: str, tmp_p
     (tmp_path / "loop.stl").symlink_to("loop.stl")
     robot = load_robot(mesh_arm(tmp_path, mesh), package_dirs=[package])
     assert robot.visual is None
-    assert "cannot be looked for" in robot.visual_problem
+    circular = mesh == "loop.stl" and sys.version_info >= (3, 13)  # which leads to itself there
+    said = "was not found" if circular else "cannot be looked for"
+    assert said in robot.visual_problem
     assert len(robot.visual_problem) < 500
 
 

@@ -515,3 +515,10 @@ def test_a_script_without_a_terminal_ends_by_itself(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     assert "after" in done.stdout
     assert "Ctrl-C" not in done.stdout
+
+
+def test_nothing_is_drawn_before_all_meshes_are_there(page: Path) -> None:
+    """A page that waits between messages draws parts of a robot meanwhile, which takes seconds."""
+    handled = page.read_text().partition("for (const numbers of")[2].partition("timeScale")[0]
+    assert "viewer.handle_command_bytearray(" in handled
+    assert "await" not in handled

@@ -386,7 +386,7 @@ def _two_segments() -> hovi.Trajectory:
     return problem.trajectory(problem.guess("cubic"))
 
 
-def test_nodes_are_marked_where_curves_differ_and_not_among_too_many(tmp_path: Path) -> None:
+def test_nodes_have_dots_where_curves_differ_and_not_among_too_many(tmp_path: Path) -> None:
     """The report of a robot of 48 joints has 0.3 MB of marks otherwise."""
     marks = []
     for joints in (3, 28, 29):

@@ -138,7 +138,9 @@ class _RobotVisualizer(MeshcatVisualizer):  # type: ignore[misc]
     def _original(self, geometry_object: pin.GeometryObject, name: str | None) -> Any:
         """The mesh as its file has it, for pictures on its surface."""
         if name is None:
-            return super().loadMeshFromFile(geometry_object)
+            with warnings.catch_warnings():  # it asks an XML element for its truth value
+                warnings.simplefilter("ignore", DeprecationWarning)
+                return super().loadMeshFromFile(geometry_object)
         mesh = self._stored.meshes[name]
         content = self._stored.content(mesh.sha256)
         suffix = Path(geometry_object.meshPath).suffix.lower()

@@ -49,7 +49,7 @@ Mask = npt.NDArray[np.bool_]
 _CURVE_POINTS = 2_000
 _MAX_MARKED_INTERVALS = 150
 _MAX_MARKED_COORDINATES = 28
-"""Number of curves up to which nodes are drawn; those of more have styles that come again."""
+"""Number of curves up to which nodes have dots; those of more have styles that come again."""
 _SURFACE_TIMES = 180
 _SECTIONS = 25
 _STRIPS = 20

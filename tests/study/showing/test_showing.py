@@ -190,7 +190,7 @@ def test_bad_input_is_one_sentence(
     assert what in error
 
 
-def test_the_state_is_told_while_a_study_runs_and_afterwards(
+def test_the_state_is_known_while_a_study_runs_and_afterwards(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     seen: list[dict[str, object]] = []

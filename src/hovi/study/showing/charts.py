@@ -216,7 +216,7 @@ def _draw_status(ax: Axes, plans: Plans) -> None:
     colors = ["#2e6f9e" if name == "minimum" else "#c0392b" for name in names]
     bars = ax.barh(names, [counts[name] for name in names], color=colors)
     ax.bar_label(bars, fmt="{:,.0f}", padding=3)
-    ax.margins(x=0.15)
+    ax.margins(x=0.25)
     ax.set(xlabel="plans")
 
 
