@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -143,6 +144,25 @@ def test_keeping_more_costs_more() -> None:
     assert kept("tube").cost < kept("line").cost < kept("line and upright").cost
     assert kept("nearly upright").cost < kept("upright").cost
     assert kept("line").cost < min(kept("speed").cost, kept("acceleration").cost)
+
+
+@pytest.mark.parametrize(
+    ("slow", "words"),
+    [
+        (
+            ToolSpeed(FRAME, 0.19),
+            "allows 0.19 m/s, and the frame moves by 0.3 m in 1.5 s: give more",
+        ),
+        (ToolSpeed(FRAME, angular="20 deg/s"), "and the frame moves by 1 rad in 1.5 s"),
+    ],
+)
+def test_a_speed_at_which_the_goal_is_out_of_reach_is_refused(slow: Keep, words: str) -> None:
+    turned = begin()[:3, :3] @ pin.rpy.rpyToMatrix(0.0, 0.0, 1.0)
+    goal = hovi.FrameGoal(FRAME, position=begin()[:3, 3] + ASIDE, rotation=turned)
+    options: dict[str, Any] = {"keep": [slow], "self_collision": False}
+    with pytest.raises(hovi.HoviError, match=re.escape(words)):
+        hovi.plan(scene(), START, goal, T, **options)
+    assert hovi.plan(scene(), START, goal, (T, 3 * T), time_weight=50.0, **options).success
 
 
 def test_a_wide_room_is_none_and_a_narrow_one_a_value() -> None:

@@ -1,4 +1,4 @@
-"""A plan that is watched shows the motions that it passes through, and ends when it is cancelled."""
+"""A watched plan shows the motions that it passes through, and ends when it is cancelled."""
 
 from __future__ import annotations
 

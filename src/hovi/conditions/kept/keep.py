@@ -88,6 +88,10 @@ class Keep(ABC):
         """
         return self
 
+    def require_time(self, ends: EndPoses, longest: float) -> None:
+        """Raise InputError where no motion of at most a duration, in [s], keeps it between ends."""
+        return
+
     @abstractmethod
     def conditions(self, robot: Robot) -> Conditions:
         """The conditions on a robot, of what is `resolved`. Raises InputError as `check`."""

@@ -6,10 +6,12 @@ from collections.abc import Callable
 from typing import ClassVar
 
 import casadi as ca
+import numpy as np
+import pinocchio as pin
 
 from hovi.checks.units import acceleration, angular_speed, speed
 from hovi.conditions.condition import Condition
-from hovi.conditions.kept.keep import Conditions, KeepFrame, placement
+from hovi.conditions.kept.keep import Conditions, EndPoses, KeepFrame, placement
 from hovi.conditions.places import AtPoints
 from hovi.conditions.sets import Between
 from hovi.effects.expressions.formula_symbols import frame_column
@@ -18,6 +20,9 @@ from hovi.errors import InputError
 from hovi.robot.robot import Robot
 from hovi.robot.space.configuration_rate import configuration_rate
 from hovi.system.dataclass import dataclass
+
+ROUNDED = 1e-9
+"""Relative excess over a speed that is rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,6 +44,25 @@ class ToolSpeed(KeepFrame):
             speed(self.linear, f"`linear` of {self.subject}")
         if self.angular is not None:
             angular_speed(self.angular, f"`angular` of {self.subject}")
+
+    def require_time(self, ends: EndPoses, longest: float) -> None:
+        """See Keep."""
+        first, last = ends.start(self.frame), ends.goal(self.frame)
+        if self.during is not None:
+            return
+        if self.linear is not None and first.position is not None and last.position is not None:
+            way = float(np.linalg.norm(last.position - first.position))
+            self._require(way, speed(self.linear, self.subject), longest, "m")
+        if self.angular is not None and first.rotation is not None and last.rotation is not None:
+            turn = float(np.linalg.norm(pin.log3(first.rotation.T @ last.rotation)))
+            self._require(turn, angular_speed(self.angular, self.subject), longest, "rad")
+
+    def _require(self, way: float, fastest: float, longest: float, unit: str) -> None:
+        if way > fastest * longest * (1.0 + ROUNDED):
+            raise InputError(
+                f"{self.subject} allows {fastest:.4g} {unit}/s, and the frame moves by {way:.4g} "
+                f"{unit} in {longest:.4g} s: give more than {way / fastest:.4g} s, or more speed."
+            )
 
     def conditions(self, robot: Robot) -> Conditions:
         """See Keep."""

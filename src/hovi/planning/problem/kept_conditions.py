@@ -48,10 +48,18 @@ def kept_between(
     robot: Robot,
     start: State | FrameGoal | None,
     goal: State | FrameGoal | Periodic | None,
+    longest: float = np.inf,
 ) -> tuple[Keep, ...]:
-    """What is kept, with what it does not say taken from both ends. Raises InputError."""
+    """What is kept, with what it does not say taken from both ends.
+
+    longest: the largest duration, in [s]; inf where it is not known yet. Raises InputError, also for
+    what cannot be kept in it.
+    """
     ends = EndPoses(_poses(robot, start, "start"), _poses(robot, goal, "goal"))
-    return tuple(each.resolved(ends) for each in kept)
+    found = tuple(each.resolved(ends) for each in kept)
+    for each in found if not (isinstance(goal, FrameGoal) and goal.regional) else ():
+        each.require_time(ends, longest)
+    return found
 
 
 def conditions_kept(

@@ -29,8 +29,8 @@ def with_kept(
 
     Raises InputError as `kept_between` and `conditions_kept` do.
     """
-    kept = kept_between(as_kept(options.keep), robot, start, goal)
     bounds, longest = position_bounds(robot, options.limits), float(np.max(duration))
+    kept = kept_between(as_kept(options.keep), robot, start, goal, longest)
     goal = goal_kept(kept, robot, start, goal, bounds, longest)
     conditions = *options.conditions, *conditions_kept(kept, robot, start, duration)
     return options.with_changes(keep=kept, conditions=conditions), goal
