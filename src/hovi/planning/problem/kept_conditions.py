@@ -52,8 +52,8 @@ def kept_between(
 ) -> tuple[Keep, ...]:
     """What is kept, with what it does not say taken from both ends.
 
-    longest: the largest duration, in [s]; inf where it is not known yet. Raises InputError, also for
-    what cannot be kept in it.
+    longest: the largest duration, in [s]; inf where it is not known yet. Raises InputError, also
+    for what cannot be kept in it.
     """
     ends = EndPoses(_poses(robot, start, "start"), _poses(robot, goal, "goal"))
     found = tuple(each.resolved(ends) for each in kept)
