@@ -57,6 +57,8 @@ from hovi.system.progress import Progress, shows_progress, silent
 Keywords = ParamSpec("Keywords")
 ASKED_GOAL = "goal"
 """The key of a motion's metadata with the goal of a frame that it was planned to, as a table."""
+LEAST_TIME = 1e-3
+"""Time limit of a plan of several once that for all of them has passed, in [s]."""
 UNSEEN = Status.INFEASIBLE, Status.DIVERGED, Status.TIME_LIMIT
 """Statuses of motions in which self-collision is not looked for."""
 
@@ -172,12 +174,14 @@ def _through(
     def planned(
         timed: PlanOptions, near: Trajectory | None, settled: State | FrameGoal | None
     ) -> Solution:
+        timed = _in_time_left(timed, deadline)
         if near is None:
             return _settled(scene, start, goal, duration, progress, timed)
         end = goal if settled is None else settled
         return _planned(scene, start, end, duration, progress, timed, None, near)
 
-    return with_best_times(planned, options, scene.robot, (start, goal), duration)
+    deadline = Deadline(options.time_limit_seconds)
+    return with_best_times(planned, options, scene.robot, (start, goal), duration, deadline)
 
 
 def _settled(
@@ -195,15 +199,22 @@ def _settled(
         return planned(start, goal, duration, progress, options, began)
     from hovi.planning.search.settled_regions import begun, moved_to, settled  # most are exact
 
+    deadline = Deadline(options.time_limit_seconds)
     goal = begun(goal, start, scene, options)
     found = planned(start, goal, duration, progress, options, began)
 
     def again(goals: Sequence[FrameGoal], last: Solution) -> Solution:
         assert last.problem is not None
-        near = moved_to(goals, last)
-        return planned(last.problem.start, goals[0], duration, progress, options, None, near)
+        near, left = moved_to(goals, last), _in_time_left(options, deadline)
+        return planned(last.problem.start, goals[0], duration, progress, left, None, near)
 
-    return settled(found, again)
+    return settled(found, again, deadline)
+
+
+def _in_time_left(options: PlanOptions, deadline: Deadline) -> PlanOptions:
+    """The options with the time that is left of a limit for several plans."""
+    left = deadline.seconds_left
+    return options if left is None else options.with_changes(time_limit=max(left, LEAST_TIME))
 
 
 def _planned(

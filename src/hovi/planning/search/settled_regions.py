@@ -29,6 +29,7 @@ from hovi.planning.solver.regions import (
 )
 from hovi.planning.solver.solver import Solution
 from hovi.scene.scene import Scene
+from hovi.system.deadline import Deadline
 
 MOST_PLANS = 12
 """Largest number of plans for one set of regions."""
@@ -36,14 +37,15 @@ Again = Callable[[Sequence[FrameGoal], Solution], Solution]
 """A plan to other goals with regions, from the last one."""
 
 
-def settled(found: Solution, again: Again) -> Solution:
+def settled(found: Solution, again: Again, deadline: Deadline) -> Solution:
     """The solution with the bounds of all regions held where the motion costs least.
 
     found: with the bounds as they are given. again: plans with them elsewhere.
+    deadline: of all plans.
     """
     if found.problem is None or not region_goals(found.problem):
         return found
-    if not found.success:
+    if not found.success and found.status not in STOPPED:
         other = again(inside(found), found)
         found = other if other.success else found
     best, steps = found, found.nit
@@ -56,6 +58,8 @@ def settled(found: Solution, again: Again) -> Solution:
         assert problem is not None
         if all(a is b for a, b in zip(goals, region_goals(problem), strict=True)):
             return _saying(dataclasses.replace(found, nit=steps))
+        if deadline.passed:
+            break
         last, found = found, again(goals, found)
         steps += found.nit
         if not found.success and found.status not in STOPPED:  # an edge may be out of reach

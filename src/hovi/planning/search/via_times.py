@@ -37,6 +37,7 @@ from hovi.planning.solver.free_duration.timed_path import stretched_path
 from hovi.planning.solver.solver import Solution, solved_on_grid
 from hovi.robot.robot import Robot
 from hovi.system.dataclass import dataclass
+from hovi.system.deadline import Deadline, OutOfTimeError
 
 Array = npt.NDArray[np.float64]
 End = State | FrameGoal
@@ -56,12 +57,17 @@ Planned = Callable[[PlanOptions, Trajectory | None, End | None], Solution]
 
 
 def with_best_times(
-    planned: Planned, options: PlanOptions, robot: Robot, ends: tuple[End, End], duration: object
+    planned: Planned,
+    options: PlanOptions,
+    robot: Robot,
+    ends: tuple[End, End],
+    duration: object,
+    deadline: Deadline,
 ) -> Solution:
     """The motion that passes via points without times when that costs least.
 
-    ends: the start and the goal. Raises InputError for a free duration, and where only some of the
-    via points have times.
+    ends: the start and the goal. deadline: of all plans. Raises InputError for a free duration, and
+        where only some of the via points have times.
     """
     via = options.via
     if any(each.timed for each in via):
@@ -78,9 +84,10 @@ def with_best_times(
         if not found.success:
             return found
         times = _Times.of(found, lengths)
-        best = times.settled()
+        with deadline.in_force():
+            best = times.settled(deadline)
         steps += best.steps
-        if best.same_as(times):
+        if best.same_as(times) or deadline.passed:
             break
         goal = None if found.problem is None else found.problem.goal
         settled = goal if isinstance(goal, FrameGoal) else None
@@ -146,10 +153,12 @@ class _Times:
         """Whether its times are those of another."""
         return self.found is other.found
 
-    def settled(self) -> _Times:
-        """Those from which no step decreases the cost."""
+    def settled(self, deadline: Deadline) -> _Times:
+        """Those from which no step decreases the cost, or the best ones at the deadline."""
         now = self
         for _ in range(MOST_STEPS):
+            if deadline.passed:
+                break
             step = -now.inverse @ now.slope
             if -0.5 * float(step @ now.slope) <= SETTLED * abs(now.found.cost):
                 return now
@@ -166,7 +175,10 @@ class _Times:
         """After a change of the parameters; None where the cost does not fall."""
         weights = self.lengths * np.exp(step)
         lengths = weights * (self.lengths.sum() / weights.sum())
-        found = _solved(self.found, self.lengths, lengths)
+        try:
+            found = _solved(self.found, self.lengths, lengths)
+        except OutOfTimeError:
+            return None
         if not (found.success and found.cost < self.found.cost):
             return None
         slope = _slope(found, lengths)

@@ -193,7 +193,7 @@ def _settled(
         known = scene, last.problem.start, new, segments, options, deadline, progress, free
         return _planned(*known, times, time.perf_counter())[0]
 
-    return settled(found, again)
+    return settled(found, again, deadline)
 
 
 def _planned(
