@@ -1,4 +1,4 @@
-"""A watched plan shows the motions that it passes through, and ends when it is cancelled."""
+"""A plan that is watched shows the motions that it passes through, and ends when cancelled."""
 
 from __future__ import annotations
 
