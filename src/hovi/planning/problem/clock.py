@@ -150,6 +150,13 @@ class Clock:
         begin, end = self.times(np.array(each.during), now, lengths).tolist()
         return dataclasses.replace(each, during=(begin, end))
 
+    def parts_of_links(
+        self, parts: Sequence[tuple[str, float, float]], now: Lengths, lengths: Lengths
+    ) -> list[tuple[str, float, float]]:
+        """The times in which links are kept clear, moved along with the parts: see Clearance."""
+        times = self.times(np.array([each[1:] for each in parts]), now, lengths).tolist()
+        return [(name, begin, end) for (name, *_), (begin, end) in zip(parts, times, strict=True)]
+
     def curve(self, curve: Curve, now: float, length: float, order: int) -> Curve:
         """A motion as a curve with another length of a single part. now: its own, in [s].
 

@@ -30,6 +30,7 @@ from hovi.system.dataclass import dataclass
 
 if TYPE_CHECKING:
     from hovi.conditions.kept.keep import Keep
+    from hovi.planning.obstacles.grasped import Grasped
 
 MAX_SEGMENTS = 1000
 """Largest number of segments of a sequence."""
@@ -37,7 +38,7 @@ _ONLY_AT_THE_END = ("a", "free_acceleration", "jerk", "free_jerk")
 """What the goal of the last segment alone may say."""
 
 
-@check_arguments_except("goal", "duration", "effects", "limits", "keep")
+@check_arguments_except("goal", "duration", "effects", "limits", "keep", "grasped")
 @dataclass(frozen=True, eq=False)
 class Segment:
     """A segment of a sequence of motions, which `hovi.plan_sequence` plans together.
@@ -52,6 +53,9 @@ class Segment:
     limits: of this segment, as for `hovi.plan`; those of the options if None.
     keep: what this segment keeps besides what the whole motion does, as for `hovi.plan`; what is
         not said is taken from its own ends.
+    grasped: hovi.Grasped, or tables of them: objects that links carry in this segment, with mass,
+        shape, and names of what they may touch. The same object in segments that follow each other
+        is carried through; in others it neither weighs nor is in the way.
     name: in messages and reports.
     Raises InputError for a duration that is not positive, and for a goal or limits of another kind,
     SceneError for effects that are none.
@@ -63,6 +67,7 @@ class Segment:
     effects: Sequence[Effect] = ()
     limits: str | Limits | Mapping[str, Any] | None = None
     keep: Sequence[Keep | Mapping[str, Any]] = ()
+    grasped: Sequence[Grasped | Mapping[str, Any]] = ()
     name: str = ""
 
     def __post_init__(self) -> None:
@@ -73,6 +78,10 @@ class Segment:
             from hovi.conditions.kept.kinds import as_kept  # most segments keep nothing
 
             object.__setattr__(self, "keep", as_kept(self.keep))
+        if not isinstance(self.grasped, tuple) or self.grasped:
+            from hovi.planning.obstacles.grasped import as_grasped  # most segments carry nothing
+
+            object.__setattr__(self, "grasped", as_grasped(self.grasped))
         if self.goal is not None and not isinstance(self.goal, State | FrameGoal | str | Mapping):
             numbers_of("the goal of a segment", self.goal)
         if self.limits is not None and not isinstance(self.limits, str | Limits | Mapping):
