@@ -192,8 +192,8 @@ class Job:
         own = zip(self.segments, fractions, strict=True)
         segments = tuple(dataclasses.replace(each, end=end) for each, end in own)
         options = longer.options.with_changes(**changes)
-        if parts := options.clearance.during:
-            options = options.carrying(clock.parts_of_links(parts, now, lengths))
+        if options.clearance.during:
+            options = options.carrying(clock.clearance(options.clearance, now, lengths).during)
         return dataclasses.replace(longer, options=options, segments=segments)
 
     def graded(self, grid: Grid) -> Grid:
