@@ -183,7 +183,8 @@ def test_a_saved_motion_knows_when_it_is_carried(tmp_path: Path) -> None:
 
 def test_reports_and_plots_show_when_it_is_near(tmp_path: Path) -> None:
     solution = with_crate()
-    page = hovi.write_report(solution, tmp_path / "report.html")
+    page = tmp_path / "report.html"
+    hovi.write_report(solution, page)
     assert "least distance" in page.read_text(encoding="utf-8")
     assert "crate" in str(solution.margins())
 
@@ -247,7 +248,7 @@ def test_a_scene_file_says_it_and_is_written_again(tmp_path: Path) -> None:
         assert each.segments[1].grasped[0].to_dict() == crate().to_dict()
         assert each.segments[0].grasped == ()
         assert "crate" in each.held_scene.robot.frame_names
-    with pytest.raises(SceneError, match="line 18: the mass of grasped object .crate. must be"):
+    with pytest.raises(SceneError, match=r"line 18: the mass of grasped object .crate. must be"):
         hovi.load_task(written(tmp_path, mass=-1.0))
 
 
