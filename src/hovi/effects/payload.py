@@ -71,8 +71,12 @@ class Payload(Effect):
     def configure(self, model: pin.Model, robot: Robot) -> None:
         """Add the inertia of the body to the model."""
         frame = frame_named(model, self.frame)
-        body = pin.Inertia(self.mass, np.array(self.center), self._tensor())
-        model.inertias[frame.parentJoint] += frame.placement.act(body)
+        model.inertias[frame.parentJoint] += frame.placement.act(self.body)
+
+    @property
+    def body(self) -> pin.Inertia:
+        """Its mass, center and inertia about it, in the frame."""
+        return pin.Inertia(self.mass, np.array(self.center), self._tensor())
 
     def describe(self) -> str:
         """One line for the description of a scene."""

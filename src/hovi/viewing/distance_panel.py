@@ -33,7 +33,8 @@ def draw_distances(
     """
     t = np.linspace(0.0, trajectory.duration, _SAMPLES)
     d = distances_over_time(trajectory, distances, t) - distances.allowance
-    changing = np.flatnonzero(np.ptp(d, axis=0) > _CONSTANT)
+    largest = np.where(np.isfinite(d), d, -np.inf).max(axis=0)  # infinite where nothing is carried
+    changing = np.flatnonzero(largest - d.min(axis=0) > _CONSTANT)
     closest = changing[np.argsort(d[:, changing].min(axis=0), kind="stable")[:_SHOWN_PAIRS]]
     for color, k in zip(_COLORS, closest, strict=False):
         pair = distances.pairs[k]

@@ -55,6 +55,7 @@ def _segments(task: Task) -> list[str]:
     """The segments: when they end, where, and what is theirs alone."""
     from hovi.checks.units import in_words
     from hovi.conditions.kept.kinds import as_kept
+    from hovi.planning.obstacles.grasped import as_grasped
     from hovi.planning.problem.notation.ends import as_end
     from hovi.planning.sequence.segment import duration_of_segment, names_of
 
@@ -68,6 +69,9 @@ def _segments(task: Task) -> list[str]:
         lines.append(line)
         own = [effect.describe() for effect in each.effects]
         own += [f"keeps {kept.describe()}" for kept in as_kept(each.keep)]
+        own += [
+            f"carries {x.name!r}, {x.mass:g} kg, at {x.frame!r}" for x in as_grasped(each.grasped)
+        ]
         if each.limits is not None:
             own.append(f"limits {_limits(each.limits)}")
         where = ["goal: none, where the best motion passes"]

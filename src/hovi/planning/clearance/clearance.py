@@ -28,7 +28,7 @@ TOUCH_DEPTH = 1e-3
 """Depth by which shapes that may touch may overlap, in [m]."""
 
 
-@check_arguments_except("obstacles", "margin", "may_touch", "left_out", "gaps")
+@check_arguments_except("obstacles", "margin", "may_touch", "left_out", "gaps", "during")
 @dataclass(frozen=True, eq=False)
 class Clearance:
     """distance >= margin between the robot's collision shapes and obstacles, all along a motion.
@@ -44,6 +44,9 @@ class Clearance:
     left_out: pairs of names of links that are not kept apart.
     gaps: pairs of names, with by how much less than the margin they may be apart, up to MOST_GAP:
         a problem sets those of pairs that are hardly nearer than it at an end.
+    during: links that are kept clear in parts of the motion alone, such as what is carried there:
+        the name of the link with the times at which a part begins and ends, in [s], once for each
+        part. At other times they may be anywhere.
     Raises InputError for other objects, equal names or a margin that is no length.
     """
 
@@ -53,6 +56,7 @@ class Clearance:
     may_touch: Sequence[tuple[str, str]] = ()
     left_out: Sequence[tuple[str, str]] = ()
     gaps: Sequence[tuple[str, str, float]] = ()
+    during: Sequence[tuple[str, float, float]] = ()
 
     def __post_init__(self) -> None:
         if isinstance(self.obstacles, Obstacle | Mapping):
@@ -98,14 +102,15 @@ class Clearance:
 
     def from_time(self, time: float) -> Clearance:
         """The clearance by a clock that starts at a time, in [s]: itself if nothing moves."""
-        if all(each.motion is None for each in self.obstacles):
+        if all(each.motion is None for each in self.obstacles) and not self.during:
             return self
         paths = [each.motion for each in self.obstacles]
         later = [
             dataclasses.replace(each, path=None if path is None else path.from_time(time))
             for each, path in zip(self.obstacles, paths, strict=True)
         ]
-        return dataclasses.replace(self, obstacles=later)
+        parts = [(name, begin - time, end - time) for name, begin, end in self.during]
+        return dataclasses.replace(self, obstacles=later, during=parts)
 
     def to_dict(self) -> dict[str, Any]:
         """The clearance as JSON-able data."""
@@ -119,6 +124,7 @@ class Clearance:
                 if pairs
             },
             **({"gaps": [list(each) for each in self.gaps]} if self.gaps else {}),
+            **({"during": [list(each) for each in self.during]} if self.during else {}),
         }
 
     @classmethod
@@ -135,7 +141,8 @@ class Clearance:
             )
             margin, both = float(data["margin"]), bool(data["self_collision"])
             gaps = [(str(a), str(b), float(gap)) for a, b, gap in data.get("gaps", ())]
-            return cls(obstacles, margin, both, touching, left_out, gaps)
+            parts = [(str(a), float(t), float(end)) for a, t, end in data.get("during", ())]
+            return cls(obstacles, margin, both, touching, left_out, gaps, parts)
         except (KeyError, TypeError, ValueError, OverflowError, AttributeError) as error:
             raise InputError(
                 f"expected the clearance that `to_dict` returns, got data with {error!r}."

@@ -22,6 +22,10 @@ from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
+Parts = tuple[tuple[float, float], ...]
+
+SAME_TIME = 1e-9
+"""Difference of times up to which they are one where a part of a motion begins or ends, in [s]."""
 
 
 @dataclass(frozen=True)
@@ -52,9 +56,13 @@ class Distances:
     geometry: the shapes, obstacles included.
     pairs: the K pairs, in the order of the columns of all results.
     ends: indices of their shapes in the geometry.
-    paths: along which obstacles move. If there are any, configurations have their time as one more
-        column: see `at`.
+    paths: along which obstacles move.
+    timed: whether there are any, or `parts`: then configurations have their time as one more
+        column, see `at`.
     moving: numbers of these by those of the shapes that move along them.
+    parts: of each pair that is bounded in parts of the motion alone, the times at which these begin
+        and end, in [s], (K,) with None for a pair that always is. At other times its distance is
+        the `reach`.
     allowance: by which a pair may be closer than the margin, shape (K,), in [m]; it is added to
         the distances, so that all pairs have the same bound.
     Raises ModelError where shapes are missing, or nothing can collide, and InputError for names
@@ -98,6 +106,7 @@ class Distances:
         self.geometry = geometry
         names = [*dict.fromkeys(links), *(each.name for each in clearance.obstacles)]
         self.pairs = tuple(marked_as_touching(pairs, clearance.may_touch, names))
+        self.parts = tuple(_parts(pair, clearance) for pair in self.pairs)
         self.ends = tuple(ends)
         allowed = float(clearance.margin) + TOUCH_DEPTH
         gaps = {(link, other): gap for link, other, gap in clearance.gaps}
@@ -116,6 +125,7 @@ class Distances:
         chosen = copy.copy(self)
         chosen.pairs = tuple(self.pairs[k] for k in pairs)
         chosen.ends = tuple(self.ends[k] for k in pairs)
+        chosen.parts = tuple(self.parts[k] for k in pairs)
         chosen.allowance = self.allowance[list(pairs)]
         chosen._chosen = np.ascontiguousarray(self._chosen[list(pairs)])
         return chosen
@@ -123,15 +133,28 @@ class Distances:
     def at(self, q: Array, t: npt.ArrayLike) -> Array:
         """Configurations (P, nq) with their times, shape (P,) or one for all, in [s].
 
-        What the other methods take where obstacles move; the configurations alone otherwise.
+        What the other methods take where they are timed; the configurations alone otherwise.
         """
-        if not self.paths:
+        if not self.timed:
             return q
         return np.column_stack([q, np.broadcast_to(np.asarray(t, dtype=float), len(q))])
 
+    @property
+    def timed(self) -> bool:
+        """Whether distances depend on time, too."""
+        return bool(self.paths) or any(part is not None for part in self.parts)
+
+    def always(self) -> Distances:
+        """The distances of all pairs at all times, also of those that are bounded in parts."""
+        chosen = copy.copy(self)
+        chosen.parts = (None,) * len(self.pairs)
+        return chosen
+
     def still(self) -> Distances:
-        """The distances of pairs without obstacles that move, for configurations without times."""
-        kept = [k for k, pair in enumerate(self.ends) if not self.moving.keys() & set(pair)]
+        """The distances of pairs that do not depend on time, for configurations without times."""
+        moving = self.moving.keys()
+        ends = zip(self.ends, self.parts, strict=True)
+        kept = [k for k, (pair, part) in enumerate(ends) if part is None and not moving & set(pair)]
         chosen = self.restricted(kept)
         chosen.paths = ()
         return chosen
@@ -139,14 +162,28 @@ class Distances:
     def _placed(self, q: Array) -> Array:
         """Configurations (P, nq) with the poses of all paths at their times, (P, nq + 7 m)."""
         nq = self.robot.nq
+        if self.timed and q.shape[1] != nq + 1:
+            raise InputError("distances that depend on time need times: see Distances.at.")
         if not self._measured.paths:
-            return q
+            return q[:, :nq]
         if not self.paths:
             poses = np.tile(np.array([0.0] * 6 + [1.0]), (len(q), self._measured.paths))
             return np.concatenate([q[:, :nq], poses], axis=1)
-        if q.shape[1] != nq + 1:
-            raise InputError("distances to obstacles that move need times: see Distances.at.")
         return np.concatenate([q[:, :nq], *(path.poses(q[:, nq]) for path in self.paths)], axis=1)
+
+    def _bounded(self, q: Array, wanted: Mask | None) -> Mask | None:
+        """Which distances are wanted and bounded at configurations with times, (P, K)."""
+        kept: Mask | None = None
+        for k, part in enumerate(self.parts):
+            if part is None:
+                continue
+            if kept is None:
+                shape = len(q), len(self.pairs)
+                kept = np.ones(shape, dtype=bool) if wanted is None else wanted.copy()
+            t = q[:, self.robot.nq, None]
+            begin, end = np.array(part).reshape(-1, 2).T
+            kept[:, k] &= ((t >= begin - SAME_TIME) & (t <= end + SAME_TIME)).any(axis=1)
+        return wanted if kept is None else kept
 
     def values(
         self,
@@ -169,7 +206,7 @@ class Distances:
             updated in place: initial guesses, as of a nearby configuration or 0 for a cold start,
             are replaced by the normals found. None for cold starts.
         """
-        placed = self._placed(q)
+        placed, wanted = self._placed(q), self._bounded(q, wanted)
         distances = self._measured.values(placed, self._chosen, reach, wanted, rounding, normals)
         return distances + self.allowance if self.allowance.any() else distances
 
@@ -204,13 +241,27 @@ class Distances:
         Second derivatives are exact for one pair of nearest points, which moves along the vertices,
         edges, faces and round surfaces that it lies on; cylinders that overlap have none.
         """
-        placed = self._placed(q)
+        placed, wanted = self._placed(q), self._bounded(q, wanted)
         given = self._chosen, reach, force, wanted, rounding, normals
         found = self._measured.expand(placed, *given)
         distances, jacobian, curvature = found
         if self.allowance.any():
             distances = distances + self.allowance
         return distances, jacobian, curvature
+
+
+def _parts(pair: Pair, clearance: Clearance) -> Parts | None:
+    """The parts of the motion in which a pair is bounded; None for one that always is."""
+    names = {name for name, _, _ in clearance.during}
+    found = [
+        [(begin, end) for name, begin, end in clearance.during if name == link]
+        for link in ((pair.link,) if pair.obstacle else (pair.link, pair.other))
+        if link in names
+    ]
+    if len(found) < 2:
+        return tuple(found[0]) if found else None
+    both = [(max(a, c), min(b, d)) for a, b in found[0] for c, d in found[1]]
+    return tuple((begin, end) for begin, end in both if begin < end)
 
 
 def _paths(clearance: Clearance) -> list[ObstaclePath]:

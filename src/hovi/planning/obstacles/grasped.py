@@ -175,7 +175,7 @@ def holding(
     Raises InputError for a frame that is no link, a name that exists, and a robot without a URDF.
     """
     expect(robot, Robot, "a robot of hovi.load_robot")
-    return _holding(robot, as_grasped(grasped))
+    return robot_holding(robot, as_grasped(grasped))
 
 
 def as_grasped(objects: Any) -> tuple[Grasped, ...]:
@@ -210,18 +210,22 @@ def _from_table(table: Mapping[str, Any], number: int) -> Grasped:
     return Grasped(**entries_of(table, f"grasped[{number}]", keys, GRASPED_KEYS))
 
 
-def scene_holding(scene: Scene, objects: tuple[Grasped, ...]) -> Scene:
-    """The scene with a robot that holds objects, the same one for the same objects."""
-    return _scene_holding(scene, objects) if objects else scene
+def scene_holding(scene: Scene, objects: tuple[Grasped, ...], massless: bool = False) -> Scene:
+    """The scene with a robot that holds objects, the same one for the same objects.
+
+    massless: whether they have shapes alone, as what is carried in a part of a motion.
+    """
+    return _scene_holding(scene, objects, massless) if objects else scene
 
 
 @lru_cache(maxsize=16)
-def _scene_holding(scene: Scene, objects: tuple[Grasped, ...]) -> Scene:
-    return dataclasses.replace(scene, robot=_holding(scene.robot, objects))
+def _scene_holding(scene: Scene, objects: tuple[Grasped, ...], massless: bool) -> Scene:
+    return dataclasses.replace(scene, robot=robot_holding(scene.robot, objects, massless))
 
 
 @lru_cache(maxsize=16)
-def _holding(robot: Robot, objects: tuple[Grasped, ...]) -> Robot:
+def robot_holding(robot: Robot, objects: tuple[Grasped, ...], massless: bool = False) -> Robot:
+    """The robot with the links of objects: see `holding`. massless: see `scene_holding`."""
     text = robot.source.urdf
     if text is None:
         raise InputError(
@@ -240,17 +244,17 @@ def _holding(robot: Robot, objects: tuple[Grasped, ...]) -> Robot:
                 f"grasped object {each.name!r} must be held by a link of robot {robot.name!r}, "
                 f"which has no {each.frame!r}: {nearest(each.frame, links)}"
             )
-        text = with_link(text, robot.source.reference, _link(each))
+        text = with_link(text, robot.source.reference, _link(each, massless))
     source = dataclasses.replace(robot.source, urdf=text, sha256=text_hash(text))
     return Robot(robot.name, build_model(source), source)
 
 
-def _link(grasped: Grasped) -> AddedLink:
+def _link(grasped: Grasped, massless: bool) -> AddedLink:
     return AddedLink(
         name=grasped.name,
         parent=grasped.frame,
         placement=grasped.placement,
-        body=grasped.body,
+        body=None if massless else grasped.body,
         shapes=[part for each in grasped.shapes for part in _urdf_shapes(each)],
     )
 

@@ -38,10 +38,11 @@ class FreeSpace:
     def of(cls, problem: TrajectoryProblem, origin: Array) -> FreeSpace | None:
         """The space of a problem; None where paths say too little about its motions.
 
-        So among obstacles that move, with passive joints, and for joints that form no vector space.
+        So where distances depend on time, with passive joints, and for joints that form no vector
+        space.
         """
         distances = problem.distances
-        if distances is None or distances.paths or not problem.about_robot:
+        if distances is None or distances.timed or not problem.about_robot:
             return None
         if problem.scene.passive or not problem.coordinates.space.flat:
             return None

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from hovi.conditions.condition import Condition
 from hovi.discrete.grid import Grid
 from hovi.discrete.guess import Curve
+from hovi.planning.clearance.clearance import Clearance
 from hovi.planning.problem.goals import Via
 from hovi.planning.problem.limits import Limits
 from hovi.scene.lagrangian import Lagrangian
@@ -149,6 +150,15 @@ class Clock:
             return each
         begin, end = self.times(np.array(each.during), now, lengths).tolist()
         return dataclasses.replace(each, during=(begin, end))
+
+    def clearance(self, of: Clearance, now: Lengths, lengths: Lengths) -> Clearance:
+        """A clearance whose links are kept clear in parts that move along with the parts."""
+        if not of.during:
+            return of
+        times = self.times(np.array([each[1:] for each in of.during]), now, lengths).tolist()
+        names = [name for name, _, _ in of.during]
+        moved = [(name, *both) for name, both in zip(names, times, strict=True)]
+        return dataclasses.replace(of, during=moved)
 
     def curve(self, curve: Curve, now: float, length: float, order: int) -> Curve:
         """A motion as a curve with another length of a single part. now: its own, in [s].

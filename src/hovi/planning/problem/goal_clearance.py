@@ -32,9 +32,10 @@ def goal_distances(goal: FrameGoal, distances: Distances) -> dict[Pair, float]:
     frame = frame_named(distances.robot.model, goal.frame)
     at = np.asarray(goal.position, dtype=float)
     objects, found = distances.geometry.geometryObjects, dict[Pair, float]()
-    for pair, (first, second) in zip(distances.pairs, distances.ends, strict=True):
+    known = zip(distances.pairs, distances.ends, distances.parts, strict=True)
+    for pair, (first, second), part in known:
         shape, obstacle = objects[first], objects[second]
-        if not pair.obstacle or pair.touching or second in distances.moving:
+        if part is not None or not pair.obstacle or pair.touching or second in distances.moving:
             continue
         if shape.parentJoint != frame.parentJoint:
             continue

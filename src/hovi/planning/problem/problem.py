@@ -278,8 +278,10 @@ class TrajectoryProblem(ProblemSummary):
         ld = DiscreteLagrangian(clock.lagrangian(self.ld.lagrangian, now, lengths), grid)
         limits = None if self.limits is None else clock.limits(self.limits, now, lengths)
         via = clock.via(self.via, now, lengths)
-        asked = clock.conditions(self.conditions, now, lengths)
-        return dataclasses.replace(self, ld=ld, limits=limits, via=via, conditions=asked)
+        asked, clear = clock.conditions(self.conditions, now, lengths), self.clearance
+        clear = None if clear is None else clock.clearance(clear, now, lengths)
+        changes: dict[str, Any] = {"limits": limits, "via": via, "conditions": asked}
+        return dataclasses.replace(self, ld=ld, clearance=clear, **changes)
 
     def _with(self, ld: DiscreteLagrangian) -> TrajectoryProblem:
         grid, T = ld.grid, self.grid.duration

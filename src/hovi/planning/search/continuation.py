@@ -109,6 +109,9 @@ def _lasting(job: Job, factor: float) -> Job:
     if job.limits.parts:
         ends = [factor * end for end in job.limits.ends]
         job = job.with_options(limits=Limits.of_segments(job.limits.parts, ends))
+    if during := job.options.clearance.during:
+        later = [(name, factor * begin, factor * end) for name, begin, end in during]
+        job = dataclasses.replace(job, options=job.options.carrying(later))
     start, goal = _slower(job.start, factor), _slower(job.goal, factor)
     return dataclasses.replace(job.with_options(via=via), grid=grid, start=start, goal=goal)
 

@@ -173,7 +173,7 @@ class Job:
     ) -> Self:
         """The job with other lengths of its free parts, in [s], on a grid for them.
 
-        Goals of segments and limits move along with the ends of the segments.
+        Goals of segments, limits and what is carried move along with the ends of the segments.
         now: the lengths of the job's own parts; that of a single one follows from its grid.
         grid: its own one for the new lengths if None.
         """
@@ -191,7 +191,10 @@ class Job:
             changes["limits"] = clock.limits(limits, now, lengths)
         own = zip(self.segments, fractions, strict=True)
         segments = tuple(dataclasses.replace(each, end=end) for each, end in own)
-        return dataclasses.replace(longer.with_options(**changes), segments=segments)
+        options = longer.options.with_changes(**changes)
+        if options.clearance.during:
+            options = options.carrying(clock.clearance(options.clearance, now, lengths).during)
+        return dataclasses.replace(longer, options=options, segments=segments)
 
     def graded(self, grid: Grid) -> Grid:
         """The grid with nodes where formulas of time change, unless the options name the grid."""

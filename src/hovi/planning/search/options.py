@@ -327,6 +327,8 @@ class PlanOptions:
         options = dataclasses.replace(self, **_withdrawn(changes), **changes)
         if not changes.keys() & set(_CLEARANCE_OPTIONS):  # keep its cached distances
             options.__dict__["clearance"] = self.clearance
+        elif self.clearance.during:
+            return options.carrying(self.clearance.during)
         return options
 
     def decided(self, robot: Robot) -> Self:
@@ -345,6 +347,12 @@ class PlanOptions:
         options = dataclasses.replace(self)
         clearance = dataclasses.replace(self.clearance, left_out=pairs)
         options.__dict__["clearance"] = clearance
+        return options
+
+    def carrying(self, during: Sequence[tuple[str, float, float]]) -> Self:
+        """These options with links that are kept clear in parts of the motion: see Clearance."""
+        options = dataclasses.replace(self)
+        options.__dict__["clearance"] = dataclasses.replace(self.clearance, during=during)
         return options
 
     def holding(self, scene: Scene) -> Scene:

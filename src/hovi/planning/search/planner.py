@@ -315,7 +315,9 @@ def _notes(found: Solution, scenes: Sequence[Scene], options: PlanOptions) -> It
     if isinstance(options.guess, Trajectory) and problem is not None:
         yield from cautions_of_guess(options.guess, problem, found.trajectory)
     looked_for = not options.self_collision and found.status not in UNSEEN
-    if looked_for and (entered := self_collision_sentence(found.trajectory)):
+    clearance = None if problem is None else problem.clearance
+    carried = frozenset(name for name, *_ in clearance.during) if clearance else frozenset[str]()
+    if looked_for and (entered := self_collision_sentence(found.trajectory, carried)):
         yield Caution(COLLISION, entered)
     if problem is None or problem.clearance is None:
         return

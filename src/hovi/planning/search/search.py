@@ -132,6 +132,10 @@ class Search:
         clearance = self.fine.problem().clearance
         assert clearance is not None
         assert free.problem is not None
+        assert free.problem.clearance is not None
+        if clearance.during:  # by its own durations
+            during = free.problem.clearance.during
+            clearance = dataclasses.replace(clearance, during=during)
         problem = on_grid_of(free.problem, free).with_clearance(clearance)
         kept, near = dataclasses.replace(free, problem=problem), 0
         ended = free.status in (*STOPPED, Status.INFEASIBLE)

@@ -32,6 +32,7 @@ from hovi.system.dataclass import dataclass
 
 if TYPE_CHECKING:
     from hovi.conditions.kept.keep import Keep
+    from hovi.planning.obstacles.grasped import Grasped
 
 MAX_SEGMENTS = 1000
 """Largest number of segments of a sequence."""
@@ -39,7 +40,7 @@ _ONLY_AT_THE_END = ("a", "free_acceleration", "jerk", "free_jerk")
 """What the goal of the last segment alone may say."""
 
 
-@check_arguments_except("goal", "duration", "effects", "limits", "keep")
+@check_arguments_except("goal", "duration", "effects", "limits", "keep", "grasped")
 @dataclass(frozen=True, eq=False)
 class Segment:
     """A segment of a sequence of motions, which `hovi.plan_sequence` plans together.
@@ -54,6 +55,9 @@ class Segment:
     limits: of this segment, as for `hovi.plan`; those of the options if None.
     keep: what this segment keeps besides what the whole motion does, as for `hovi.plan`; what is
         not said is taken from its own ends.
+    grasped: hovi.Grasped, or tables of them: objects that links carry in this segment, with mass,
+        shape, and names of what they may touch. The same object in segments that follow each other
+        is carried through; in others it neither weighs nor is in the way.
     name: in messages and reports.
     Raises InputError for a duration that is not positive, and for a goal or limits of another kind,
     SceneError for effects that are none.
@@ -65,6 +69,7 @@ class Segment:
     effects: Sequence[Effect] = ()
     limits: str | Limits | Mapping[str, Any] | None = None
     keep: Sequence[Keep | Mapping[str, Any]] = ()
+    grasped: Sequence[Grasped | Mapping[str, Any]] = ()
     name: str = ""
 
     def __post_init__(self) -> None:
@@ -75,6 +80,10 @@ class Segment:
             from hovi.conditions.kept.kinds import as_kept  # most segments keep nothing
 
             object.__setattr__(self, "keep", as_kept(self.keep))
+        if not isinstance(self.grasped, tuple) or self.grasped:
+            from hovi.planning.obstacles.grasped import as_grasped  # most segments carry nothing
+
+            object.__setattr__(self, "grasped", as_grasped(self.grasped))
         named = self.goal is None or isinstance(self.goal, State | FrameGoal | str | Mapping)
         if not named and not are_frames(self.goal):
             numbers_of("the goal of a segment", cast(npt.ArrayLike, self.goal))

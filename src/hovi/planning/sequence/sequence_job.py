@@ -49,6 +49,10 @@ def job_of(
         for each, end in zip(segments, ends, strict=True)
     )
     limits = limits_of(scene, segments, options)
+    if any(each.grasped for each in segments):
+        from hovi.planning.sequence.carried import parts_of_carried  # most carry nothing
+
+        options = options.carrying(parts_of_carried(segments, ends))
     grid = sequence_grid(segments, options, scene.order)
     first = Job(scene, grid, State(()), State(()), options, job_segments)
     moves = _moves(goals, ends, limits)

@@ -109,7 +109,7 @@ def plan_sequence(
 
     scene: the robot with the effects that act all the time.
     start: as for `plan`.
-    segments: hovi.Segment(goal, duration, effects=..., limits=..., name=...), or tables as in a
+    segments: hovi.Segment(goal, duration, effects=..., grasped=..., name=...), or tables as in a
         scene file, {"goal": {"q": ...}, "duration": "1 s", ...}, in order of time; the last one
         needs a goal.
     progress, on_iterate, cancel: as for `plan`.
@@ -148,7 +148,10 @@ def _of_segments(
             'objective = "time" is for a single motion: for the segments of a sequence, give them '
             "free durations and a large time_weight."
         )
-    scene, begin, goals = _in_group(chosen.holding(scene), start, checked, chosen)
+    scene = chosen.holding(scene)
+    if any(each.grasped for each in checked):
+        scene, checked, chosen = _carrying(scene, checked, chosen)
+    scene, begin, goals = _in_group(scene, start, checked, chosen)
     scene = chosen.aiming(scene)
     deadline = Deadline(chosen.time_limit_seconds)
     names = (f"the goal of {name!r}" for name in names_of(checked))
@@ -232,9 +235,23 @@ def _alone(
         own = options.limits_on(acting, segment.limits)
         options = options.with_changes(limits=own.with_conditions_of(whole))
     assert segment.goal is not None
+    if segment.grasped:
+        options = options.with_changes(grasped=(*options.grasped, *segment.grasped))
     if segment.keep:
         options = options.with_changes(keep=(*options.keep, *segment.keep))
     return plan(acting, start, segment.goal, segment.duration, progress, options)
+
+
+def _carrying(
+    scene: Scene, segments: Sequence[Segment], options: PlanOptions
+) -> tuple[Scene, tuple[Segment, ...], PlanOptions]:
+    """The scene, the segments and the options with what segments carry."""
+    from hovi.planning.sequence.carried import carried_objects, scene_carrying, with_payloads
+
+    objects = carried_objects(segments)
+    options = options.with_changes(grasped=(*options.grasped, *objects))
+    scene = scene_carrying(scene, segments)
+    return scene, with_payloads(scene, segments), options
 
 
 def _in_group(

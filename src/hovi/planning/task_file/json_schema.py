@@ -41,6 +41,7 @@ def json_schema() -> dict[str, Any]:
         "effects": (simulated, Field(default=None, description="tables of effects")),
         "limits": (limits | None, SegmentTable.model_fields["limits"]),
         "goal": (GoalTable | list[GoalTable] | Bare | None, SegmentTable.model_fields["goal"]),
+        "grasped": (list[GraspedTable] | GraspedTable, SegmentTable.model_fields["grasped"]),
     }
     segment = create_model("Segment", __base__=SegmentTable, __doc__="[[segments]].", **own)
     keys: dict[str, Any] = {

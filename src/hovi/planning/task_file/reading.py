@@ -86,6 +86,7 @@ def task_of(data: Mapping[str, Any], toml: TomlText, cache: SceneCache | None = 
     start = read_end(table.start, ("start",), held, toml)
     begin, note = Begin(table.group, start), _note(table, robot, toml)
     if table.segments:
+        held = _carrying(table, held, toml)
         segments = read_segments(table.segments, held, toml, begin)
         whole = duration_of(segments)
         options = _options(table, whole, held, grasped, toml)
@@ -189,6 +190,15 @@ def _grasped(table: ShapedTable, robot: Robot, toml: TomlText) -> tuple[tuple[Gr
     from hovi.planning.task_file.grasped_tables import read_grasped  # most robots hold nothing
 
     return read_grasped(table.grasped, robot, toml)
+
+
+def _carrying(table: ShapedTable, robot: Robot, toml: TomlText) -> Robot:
+    """The robot with the links of what segments carry."""
+    if not any(each.grasped for each in table.segments):
+        return robot
+    from hovi.planning.task_file.grasped_tables import robot_carrying  # most carry nothing
+
+    return robot_carrying(table.segments, robot, toml)
 
 
 def _scene(table: ShapedTable, robot: Robot, toml: TomlText) -> Scene:

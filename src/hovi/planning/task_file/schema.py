@@ -218,6 +218,24 @@ class ViaTable(GoalTable):
     time: PositiveSeconds | Literal["free"] = Field(description=TIME_IN_WORDS)
 
 
+class GraspedTable(Table):
+    """[[grasped]]."""
+
+    name: str = Field(default="grasped", description="the name of the object's link")
+    frame: str = Field(description=GRASPED_KEYS["frame"])
+    mass: FiniteFloat = Field(description=GRASPED_KEYS["mass"])
+    shape: Any = Field(description=GRASPED_KEYS["shape"])
+    position: Direction | None = Field(default=None, description="a list of three finite numbers")
+    rpy: Direction | None = Field(
+        default=None, description="a list of three finite numbers: roll, pitch and yaw in radians"
+    )
+    center: Direction | None = Field(default=None, description="a list of three finite numbers")
+    inertia: list[FiniteFloat] | None = Field(
+        default=None, description="a list of six finite numbers: Ixx, Iyy, Izz, Ixy, Ixz, Iyz"
+    )
+    may_touch: list[str] = Field(default=[], description="a list of obstacles and links")
+
+
 class SegmentTable(Table):
     """[[segments]]: the segments of a sequence."""
 
@@ -232,6 +250,9 @@ class SegmentTable(Table):
     )
     keep: Annotated[list[dict[str, Any]], BeforeValidator(_listed)] = Field(
         default=[], description="tables [[segments.keep]] with a kind each"
+    )
+    grasped: Annotated[list[GraspedTable], BeforeValidator(_listed)] = Field(
+        default=[], description="tables [[segments.grasped]] with frame, mass and shape"
     )
     effects: dict[str, dict[str, Any]] = Field(default={}, description="tables of effects")
 
@@ -269,24 +290,6 @@ class LimitsTable(Table):
         default=0.0, ge=0, lt=0.5, description="a fraction of the range, from 0 to below 0.5"
     )
     tolerance: FiniteFloat = Field(default=1e-6, gt=0, description="fraction of the range, above 0")
-
-
-class GraspedTable(Table):
-    """[[grasped]]."""
-
-    name: str = Field(default="grasped", description="the name of the object's link")
-    frame: str = Field(description=GRASPED_KEYS["frame"])
-    mass: FiniteFloat = Field(description=GRASPED_KEYS["mass"])
-    shape: Any = Field(description=GRASPED_KEYS["shape"])
-    position: Direction | None = Field(default=None, description="a list of three finite numbers")
-    rpy: Direction | None = Field(
-        default=None, description="a list of three finite numbers: roll, pitch and yaw in radians"
-    )
-    center: Direction | None = Field(default=None, description="a list of three finite numbers")
-    inertia: list[FiniteFloat] | None = Field(
-        default=None, description="a list of six finite numbers: Ixx, Iyy, Izz, Ixy, Ixz, Iyz"
-    )
-    may_touch: list[str] = Field(default=[], description="a list of obstacles and links")
 
 
 class ShapedTable(Table):

@@ -23,6 +23,7 @@ from hovi.robot.robot import Robot
 
 if TYPE_CHECKING:
     from hovi.conditions.kept.keep import Keep
+    from hovi.planning.obstacles.grasped import Grasped
 
 
 def check_keys(table: ShapedTable, toml: TomlText) -> None:
@@ -65,8 +66,17 @@ def _read_segment(
         effects=read_effects(table.effects, robot, toml, keys),
         limits=None if limits is None else read_limits(limits, robot, toml, (*keys, "limits")),
         keep=_kept(table, robot, toml, number),
+        grasped=_grasped(table, toml, number),
         name=table.name,
     )
+
+
+def _grasped(table: SegmentTable, toml: TomlText, number: int) -> tuple[Grasped, ...]:
+    if not table.grasped:
+        return ()
+    from hovi.planning.task_file.grasped_tables import grasped_of  # most segments carry nothing
+
+    return grasped_of(table.grasped, toml, ("segments", number))
 
 
 def _kept(table: SegmentTable, robot: Robot, toml: TomlText, number: int) -> tuple[Keep, ...]:
@@ -96,6 +106,10 @@ def _segment_table(segment: Segment, name: str, robot: Robot) -> dict[str, Any]:
         from hovi.planning.task_file.keep_tables import keep_table
 
         table["keep"] = [keep_table(each) for each in segment.keep]
+    if segment.grasped:
+        from hovi.planning.obstacles.grasped import as_grasped
+
+        table["grasped"] = [each.to_dict() for each in as_grasped(segment.grasped)]
     if segment.effects:
         table["effects"] = {each.key: effect_table(each) for each in segment.effects}
     return table

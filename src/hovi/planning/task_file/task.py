@@ -112,8 +112,13 @@ class Task(Summarized):
 
     @property
     def held_scene(self) -> Scene:
-        """The scene with what its robot holds."""
-        return self.options.holding(self.scene)
+        """The scene with what its robot holds, and with the shapes of what segments carry."""
+        held = self.options.holding(self.scene)
+        if not any(each.grasped for each in self.segments):
+            return held
+        from hovi.planning.sequence.carried import scene_carrying  # most carry nothing
+
+        return scene_carrying(held, self.segments)
 
     @property
     def planned_scene(self) -> Scene:

@@ -31,13 +31,13 @@ class AddedLink:
     """A link with its shapes, for contact and for viewing alike.
 
     parent: the link that it is joined to. placement: of its frame in that of the parent.
-    body: its inertia in its own frame.
+    body: its inertia in its own frame; None for a link without mass.
     """
 
     name: str
     parent: str
     placement: pin.SE3
-    body: pin.Inertia
+    body: pin.Inertia | None
     shapes: Sequence[UrdfShape]
 
 
@@ -45,13 +45,8 @@ def with_link(text: str, name: str, added: AddedLink) -> str:
     """The text of a URDF with one more link. name: of the URDF in messages. Raises ModelError."""
     robot = checked_urdf(text, name)
     link = ElementTree.SubElement(robot, "link", {"name": added.name})
-    inertial = ElementTree.SubElement(link, "inertial")
-    _origin(inertial, pin.SE3(np.eye(3), added.body.lever))
-    ElementTree.SubElement(inertial, "mass", {"value": repr(float(added.body.mass))})
-    tensor = np.asarray(added.body.inertia)
-    names = {"ixx": (0, 0), "ixy": (0, 1), "ixz": (0, 2), "iyy": (1, 1), "iyz": (1, 2)}
-    entries = {key: repr(float(tensor[at])) for key, at in {**names, "izz": (2, 2)}.items()}
-    ElementTree.SubElement(inertial, "inertia", entries)
+    if added.body is not None:
+        _inertial(link, added.body)
     for shape in added.shapes:
         for kind in ("visual", "collision"):
             element = ElementTree.SubElement(link, kind)
@@ -68,6 +63,16 @@ def with_link(text: str, name: str, added: AddedLink) -> str:
     ElementTree.SubElement(joint, "parent", {"link": added.parent})
     ElementTree.SubElement(joint, "child", {"link": added.name})
     return ElementTree.tostring(robot, encoding="unicode")
+
+
+def _inertial(link: ElementTree.Element, body: pin.Inertia) -> None:
+    inertial = ElementTree.SubElement(link, "inertial")
+    _origin(inertial, pin.SE3(np.eye(3), body.lever))
+    ElementTree.SubElement(inertial, "mass", {"value": repr(float(body.mass))})
+    tensor = np.asarray(body.inertia)
+    names = {"ixx": (0, 0), "ixy": (0, 1), "ixz": (0, 2), "iyy": (1, 1), "iyz": (1, 2)}
+    entries = {key: repr(float(tensor[at])) for key, at in {**names, "izz": (2, 2)}.items()}
+    ElementTree.SubElement(inertial, "inertia", entries)
 
 
 def added_links(model: pin.Model) -> frozenset[str]:

@@ -64,7 +64,7 @@ def solves_jointly(problem: TrajectoryProblem, clock: Clock, lengths: Array, nea
         return False
     if problem.along and not _scales(problem, nodes):
         return False
-    if distances is not None and (distances.paths or problem.ld.chart is not None):
+    if distances is not None and (distances.timed or problem.ld.chart is not None):
         return False
     return near or (not equations and distances is None)
 

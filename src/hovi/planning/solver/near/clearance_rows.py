@@ -135,16 +135,19 @@ class ClearanceRows:
 
         times: of obstacles at the instants, instead of their own.
         """
+        some = self._some if times is None else self._some.always()
         instant, column = self._instant[chosen], self._column[chosen]
         used = np.zeros(len(self._wanted), dtype=bool)
         used[instant] = True
         place = (np.cumsum(used) - 1)[instant]
         wanted = np.zeros((int(place.max()) + 1, self._wanted.shape[1]), dtype=bool)
         wanted[place, column] = True
-        q, sizes = self._configurations(path, times)[used], self._sizes[used]
+        t = self._batch.t if times is None else times
+        q = some.at(configurations(self._problem, path, self._batch), t)[used]
+        sizes = self._sizes[used]
         normals = np.zeros((*wanted.shape, 3))
         normals[place, column] = self._normals[chosen]
-        d = self._some.values(q, self._reach, wanted, sizes, normals)
+        d = some.values(q, self._reach, wanted, sizes, normals)
         self._normals[chosen] = normals[place, column]
         beyond = np.full(self.size, np.nan)
         beyond[chosen] = (d[place, column] - self.least) / DISTANCE_SCALE
@@ -339,10 +342,9 @@ class ClearanceRows:
         self._sizes = np.zeros(self._wanted.shape)
         self._sizes[self._instant, self._column] = rounding
 
-    def _configurations(self, path: DiscretePath, times: Array | None = None) -> Array:
-        """q at the instants, as distances take it. times: of obstacles, instead of their own."""
-        t = self._batch.t if times is None else times
-        return self._some.at(configurations(self._problem, path, self._batch), t)
+    def _configurations(self, path: DiscretePath) -> Array:
+        """q at the instants, as distances take it."""
+        return self._some.at(configurations(self._problem, path, self._batch), self._batch.t)
 
     @property
     def _reach(self) -> float:

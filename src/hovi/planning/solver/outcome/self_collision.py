@@ -26,8 +26,11 @@ DEPTH = 1e-3
 """Overlap, in [m], from which a pair is reported: hulls are a little larger than links."""
 
 
-def self_collision_sentence(motion: Trajectory) -> str:
-    """The links that a motion brings into each other, as a sentence; "" if none are found."""
+def self_collision_sentence(motion: Trajectory, but: frozenset[str] = frozenset()) -> str:
+    """The links that a motion brings into each other, as a sentence; "" if none are found.
+
+    but: links that are not looked at.
+    """
     robot = motion.robot
     if robot is None:
         return ""
@@ -36,7 +39,9 @@ def self_collision_sentence(motion: Trajectory) -> str:
         if not links:
             return ""
         t = np.linspace(0.0, motion.duration, SAMPLES)
-        d = pairs.values(motion.configurations(t), np.arange(len(links)), 0.0)
+        looked_at = np.array([k for k, pair in enumerate(links) if but.isdisjoint(pair)], dtype=int)
+        d = np.full((SAMPLES, len(links)), np.inf)
+        d[:, looked_at] = pairs.values(motion.configurations(t), looked_at, 0.0)
     except (HoviError, OutOfTimeError):  # no shapes, some are missing, or no time
         return ""
     deepest = np.where((d > 0).any(axis=0), d.min(axis=0), np.inf)

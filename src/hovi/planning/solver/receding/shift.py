@@ -22,6 +22,7 @@ from hovi.discrete.path_on_grid import path_on_grid
 from hovi.discrete.state import State
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError
+from hovi.planning.clearance.clearance import Clearance
 from hovi.planning.problem.clock import SAME_LENGTH
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.goals import Via
@@ -88,9 +89,17 @@ class Shift:
             goal=goal,
             via=via,
             limits=None if limits is None else self._stretched(limits),
-            clearance=None if clearance is None else clearance.from_time(self.elapsed),
+            clearance=None if clearance is None else self._clearance(clearance),
             conditions=tuple(filter(None, map(self._later, self.problem.conditions))),
         )
+
+    def _clearance(self, of: Clearance) -> Clearance:
+        """The clearance of what is left: what is carried is carried in the same segments."""
+        later = of.from_time(self.elapsed)
+        parts = [
+            (name, begin * self._ratio, end * self._ratio) for name, begin, end in later.during
+        ]
+        return dataclasses.replace(later, during=parts) if parts else later
 
     @cached_property
     def _ld(self) -> DiscreteLagrangian:
