@@ -105,7 +105,7 @@ def test_second_derivatives_match_casadi(name: str) -> None:
     symbols = scene.terms.symbols
     space = None if robot.vector_joints else robot.space
     tau = scene.graph()(*symbols.columns())[0]
-    slow = CasadiTorque(symbols.columns(), tau, False, space)
+    slow = CasadiTorque(symbols.columns(), tau, space)
     at = points(robot)
     random = np.random.default_rng(2)
     R, curvature = random.uniform(0.5, 2.0, robot.nv), random.normal(size=at[1].shape)

@@ -396,6 +396,11 @@ class FrameGoal:
         return f"frame {self.frame!r} misses it by {' and '.join(parts)}"
 
 
+MAX_LEFT_OUT = 1e-6
+"""Largest distance from a goal some of whose rows are left out, in [m]: other roots of the others
+have their values, too."""
+
+
 @dataclass(frozen=True, eq=False)
 class PoseDifference(Function):
     """The equations of a frame goal: position - target, then the sine of the rotation error.
@@ -450,8 +455,9 @@ class PoseDifference(Function):
         return replace(self, left_out=follow) if follow else self
 
     def is_spurious(self, at: Points) -> bool:
-        """Whether the frame is half a turn away from its goal."""
-        return self.goal.miss(self.robot, at.q[0])[1] > MAX_ANGLE_ERROR
+        """Whether a frame is half a turn away, or where only rows that are left out say otherwise."""
+        distance, angle = self.goal.miss(self.robot, at.q[0])
+        return angle > MAX_ANGLE_ERROR or (bool(self.left_out) and distance > MAX_LEFT_OUT)
 
     def describe(self, at: Points, missed: Array) -> str:
         """The distance and the angle by which the frame misses its goal."""
@@ -463,7 +469,7 @@ class PoseDifference(Function):
 
         def evaluated(numbers: bytes) -> tuple[Array, Array]:
             c, J = self._linear(np.frombuffer(numbers)[None])
-            return c[0], J.reshape(self.size, self.robot.nv)
+            return c.reshape(self.size), J.reshape(self.size, self.robot.nv)
 
         return lru_cache(maxsize=KEPT)(evaluated)
 

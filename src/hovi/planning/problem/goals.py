@@ -143,7 +143,8 @@ def goal_state(
         f"no configuration that reaches the {name} was found: at the nearest, {reached.reason}; "
         f"{hint_on_frame(coordinates, goal) or advice}"
     )
-    wanted = difference if reason else _independent(difference)
+    # of one frame alone all rows are kept: which follow at a configuration may select another root
+    wanted = _independent(difference) if goal.also and not reason else difference
     held = (wanted,) if wanted.size > 0 else ()
     return GoalState(state, (*held, *velocities), reason)
 
