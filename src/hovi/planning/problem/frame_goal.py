@@ -455,7 +455,7 @@ class PoseDifference(Function):
         return replace(self, left_out=follow) if follow else self
 
     def is_spurious(self, at: Points) -> bool:
-        """Whether a frame is half a turn away, or where only rows that are left out say otherwise."""
+        """Whether a frame is half a turn away, or where rows that are left out do not hold."""
         distance, angle = self.goal.miss(self.robot, at.q[0])
         return angle > MAX_ANGLE_ERROR or (bool(self.left_out) and distance > MAX_LEFT_OUT)
 
