@@ -57,8 +57,9 @@ def kept_between(
     """
     ends = EndPoses(_poses(robot, start, "start"), _poses(robot, goal, "goal"))
     found = tuple(each.resolved(ends) for each in kept)
-    for each in found if not (isinstance(goal, FrameGoal) and goal.regional) else ():
-        each.require_time(ends, longest)
+    if not (isinstance(goal, FrameGoal) and goal.regional):
+        for each in found:
+            each.require_time(ends, longest)
     return found
 
 
