@@ -110,7 +110,7 @@ def test_a_lesson_shows_what_its_code_prints_and_a_small_picture(lesson: Path) -
 
 
 def test_the_first_picture_is_small() -> None:
-    assert (TOP / "docs" / "images" / "first_motion.gif").stat().st_size < 1.5e6
+    assert (TOP / "docs" / "images" / "pick.gif").stat().st_size < 1.5e6
 
 
 SEARCHED = {

@@ -28,7 +28,9 @@ from oracles.headless_browser import Tab, headless_browser  # noqa: E402
 DESKTOP, PHONE, MOVING, MENU = (1280, 800), (390, 844), (560, 350), (640, 360)
 FRAMES_PER_SECOND, HOLD = 16, 0.9
 COLORS = 96
-ACCENTS = ("#cc78a6", "#d08fb2", "#f0d000", "#0072b2", "#d55e00")
+IN_FRONT = ([2.1, -0.7, 1.05], [0.3, 0.0, 0.28])
+Camera = tuple[list[float], list[float]]
+ACCENTS = ("#cc78a6", "#d08fb2", "#f0d000", "#0072b2", "#d55e00", "#4d8c59", "#2f5738")
 
 
 def first_motion() -> hovi.Trajectory:
@@ -81,11 +83,18 @@ def still(
         tab.screenshot(IMAGES / name)
 
 
-def moving(motion: hovi.Trajectory, name: str, speed: float = 1.0) -> None:
-    """A GIF of the scene alone: the motion once, and a while at its end."""
+def moving(
+    motion: hovi.Trajectory, name: str, speed: float = 1.0, camera: Camera | None = None
+) -> None:
+    """A GIF of the scene alone: the motion once, and a while at its end.
+
+    camera: its position and the point that it looks at, in [m]; None for that of the page.
+    """
     count = round(motion.duration / speed * FRAMES_PER_SECOND)
     with page(MOVING, motion) as tab:
         tab.value("document.body.classList.add('bare'); stage.resize(); 1")
+        if camera is not None:
+            tab.value(f"stage.stand({camera[0]}, {camera[1]}); 1")
         frames = []
         for k in range(count + 1):
             seek(tab, motion.duration * k / count)
@@ -127,7 +136,7 @@ def menu() -> None:
 
 
 PICTURES: dict[str, Callable[[], None]] = {
-    "first": lambda: moving(first_motion(), "first_motion.gif"),
+    "pick": lambda: moving(planned("panda_over_wall"), "pick.gif", camera=IN_FRONT),
     "swing": lambda: moving(swing_up(), "swing_up.gif", speed=2.0),
     "desktop": lambda: still(DESKTOP, [first_motion()], "replay.png"),
     "menu": menu,

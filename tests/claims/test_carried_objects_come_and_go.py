@@ -14,10 +14,13 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 import pytest
+import umsgpack
 
 import hovi
 from hovi.errors import InputError, SceneError
+from hovi.viewing.payloads import Payloads
 from hovi.viewing.recorded_limits import imposed_clearance, kept_distances
+from hovi.viewing.replay_session import page_of
 
 Array = npt.NDArray[np.float64]
 
@@ -41,6 +44,10 @@ def crate(mass: float = MASS, **changes: Any) -> hovi.Grasped:
     """Hanging below the tool, so that its bottom is where the wall is."""
     given: dict[str, Any] = {"name": "crate", "may_touch": ["wrist_3_link", "ee_link"]}
     return hovi.Grasped(hovi.Box(SIZE, HANGING), "tool0", mass, **{**given, **changes})
+
+
+def crate_at(frame: str) -> hovi.Grasped:
+    return hovi.Grasped(hovi.Box(SIZE, HANGING), frame, MASS, f"at {frame}")
 
 
 def ball(frame: str) -> hovi.Grasped:
@@ -108,6 +115,28 @@ def test_the_crate_keeps_its_margin_while_it_is_carried_and_not_before_or_after(
     highest = [heights(each[part == 1]).max() for each in (q, q_without)]
     assert highest[0] > highest[1] + 0.05
     assert solution.margins().distance == pytest.approx(MARGIN, abs=1e-3)
+
+
+def drawn_at(motion: hovi.Trajectory, link: str, t: Array) -> Array:
+    """Positions of a drawn link in the animation of a page, (M, 3), in [m]."""
+    (message,) = (each for each in page_of(motion).messages.all() if each.kind == "set_animation")
+    clips = umsgpack.unpackb(message.packed)["animations"]
+    (clip,) = (each["clip"] for each in clips if each["path"].endswith(f"/{link}_0"))
+    (track,) = (each for each in clip["tracks"] if each["name"] == ".position")
+    times, places = ([key[name] for key in track["keys"]] for name in ("time", "value"))
+    return np.array([np.interp(t, times, x) for x in np.transpose(places)]).T
+
+
+def test_the_crate_is_drawn_where_it_lies_before_and_after_it_is_carried() -> None:
+    motion = with_crate().trajectory
+    ends = np.cumsum([0.0, *motion.segment_durations])
+    t = np.linspace(0.0, motion.duration, 41)
+    carried = np.clip(t, ends[1], ends[2])
+    poses = [arm().robot.frame_pose("tool0", q) for q in motion.configurations(carried)]
+    crates = np.array([pose[:3, :3] @ HANGING + pose[:3, 3] for pose in poses])
+    np.testing.assert_allclose(drawn_at(motion, "crate", t), crates, atol=1e-3)
+    assert np.ptp(crates[:, 1]) > 0.5
+    assert Payloads.of(motion).items == ()  # its mass is no ball in it
 
 
 def test_its_mass_acts_while_it_is_carried() -> None:
@@ -260,7 +289,7 @@ REFUSED: dict[str, tuple[list[Any], str]] = {
     "a name that a frame has": ([[crate(name="tool0")], []], "has a frame 'tool0' already"),
     "no link": (
         [[ball("hand")], []],
-        "must be held by a link of robot 'ur5', which has no 'hand'",
+        "must be held by a link or a tool of robot 'ur5', which has no 'hand'",
     ),
     "two joints": (
         [[crate(), ball("forearm_link")], []],
@@ -276,6 +305,19 @@ def test_what_cannot_be_carried_is_refused_in_a_sentence(case: str) -> None:
     grasped, sentence = REFUSED[case]
     with pytest.raises(InputError, match=sentence):
         planned([hovi.Segment(at(0.4), 1.0, grasped=x) for x in grasped], at(0.6))
+
+
+def test_the_frame_of_a_tool_may_hold_an_object() -> None:
+    tools = {
+        "grip": {"frame": "tool0", "position": [0, 0, 0.1], "rpy": [0.3, 0, 0]},
+        "tip": {"frame": "grip", "position": [0, 0.02, 0.05]},
+    }
+    held = hovi.holding(hovi.load_robot("ur5", tools=tools), [crate(), crate_at("tip")])
+    q = at(0.6)
+    offset = np.linalg.inv(held.frame_pose("crate", q)) @ held.frame_pose("at tip", q)
+    tilt = pin.rpy.rpyToMatrix(0.3, 0.0, 0.0)
+    np.testing.assert_allclose(offset[:3, :3], tilt, atol=1e-12)
+    np.testing.assert_allclose(offset[:3, 3], [0, 0, 0.1] + tilt @ [0, 0.02, 0.05], atol=1e-12)
 
 
 def test_several_objects_and_a_payload_of_one_joint_act_together() -> None:

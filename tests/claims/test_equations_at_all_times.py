@@ -305,7 +305,10 @@ def turned(q: ca.SX, v: ca.SX) -> ca.SX:
 
 
 REFUSED: dict[str, tuple[dict[str, Any], str]] = {
-    "smooth": ({"smooth": True}, "which a cost of order 3 does not support"),
+    "smooth": (
+        {"smooth": True},
+        "a cost of order 3 (smooth=True) does not support: leave it out, or give it room",
+    ),
     "free duration": (
         {
             "duration": (0.5, 3.0),

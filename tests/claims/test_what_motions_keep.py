@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import re
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -28,6 +29,8 @@ from hovi.conditions import (
     ToolSpeed,
     Upright,
 )
+from hovi.conditions.condition import with_function
+from hovi.conditions.excess import worst
 
 Array = npt.NDArray[np.float64]
 FRAME, T = "tool0", 1.5
@@ -52,6 +55,13 @@ def planned(*kept: Keep | dict[str, Any], **options: Any) -> hovi.Solution:
     goal = hovi.FrameGoal(FRAME, position=begin()[:3, 3] + ASIDE)
     asked: dict[str, Any] = {"self_collision": False} | options
     return hovi.plan(scene(), START, goal, T, keep=kept, **asked)
+
+
+@cache
+def turning() -> hovi.Solution:
+    """To where the tool points aside."""
+    goal = hovi.FrameGoal(FRAME, position=begin()[:3, 3] + ASIDE, axis=([0, 0, 1], [0, 1, 0]))
+    return hovi.plan(scene(), START, goal, T, self_collision=False)
 
 
 def times(motion: hovi.Trajectory, part: tuple[float, float] | None = None) -> Array:
@@ -172,6 +182,36 @@ def test_a_wide_room_is_none_and_a_narrow_one_a_value() -> None:
     narrow = planned(OnLine(FRAME, within="0.05 mm"))
     assert narrow.margins().missed["on line tool0"] <= 1e-5
     assert np.isclose(free.cost, narrow.cost, rtol=1e-3)
+
+
+ROOMS: dict[str, tuple[Keep, str, Callable[[Array], float]]] = {
+    "an angle": (
+        Upright(FRAME, axis=([0, 0, 1], begin()[:3, 2]), within="5 deg"),
+        r"(\S+) deg at .* its bound is 5$",
+        lambda T: np.degrees(np.arccos(T[:, :3, 2] @ T[0, :3, 2])).max(),
+    ),
+    "a distance": (
+        OnPlane(FRAME, normal=[0, 1, 0], point=begin()[:3, 3], within="5 mm"),
+        r"(\S+) m at .* its bound is 0.005$",
+        lambda T: np.abs(T[:, 1, 3] - T[0, 1, 3]).max(),
+    ),
+    "a speed": (
+        ToolSpeed(FRAME, "50 mm/s"),
+        r"(\S+) m/s at .* its bound is 0.05$",
+        lambda T: 2000 / 1.5 * np.linalg.norm(np.diff(T[:, :3, 3], axis=0), axis=1).max(),
+    ),
+}
+
+
+@pytest.mark.parametrize("what", ROOMS)
+def test_what_exceeds_its_room_is_said_in_the_unit_of_the_room(what: str) -> None:
+    kept, said, judged = ROOMS[what]
+    (given,) = kept.conditions(scene().robot)
+    clause = worst(turning().trajectory, with_function(given, scene().robot))[1]
+    found = re.search(said, clause)
+    assert found, clause
+    most = judged(poses(turning().trajectory, times(turning().trajectory)))
+    assert float(found[1]) == pytest.approx(most, rel=1e-3)
 
 
 def test_margins_name_what_is_kept() -> None:

@@ -106,7 +106,8 @@ def _measure(given: Any, what: str, units: Mapping[str, float], of: str, such: s
         parsed = _MEASURE.fullmatch(given.strip())
         number, unit = (float(parsed[1]), parsed[2]) if parsed else (None, "")
         if parsed and unit not in units:
-            raise InputError(f"{what} {given!r} has the unit {unit!r}: {nearest(unit, units)}")
+            has = f"the unit {unit!r}" if unit else "no unit"
+            raise InputError(f"{what} {given!r} has {has}: {nearest(unit, units)}")
     size = _as_double(number, what) * units[unit] if is_number(number) else math.nan
     if not TINIEST <= size <= 1.0 / TINIEST:
         raise InputError(

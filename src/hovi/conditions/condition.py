@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import lru_cache
 from typing import Any, Generic, Self, TypeVar
 
@@ -29,6 +29,8 @@ Place = TypeVar("Place", bound=Where, covariant=True)
 
 TOLERANCE = 1e-6
 """Fraction of its scale by which a bound may be exceeded."""
+DIGITS = 4, 6, 9
+"""Digits of values in messages: the least that tell a value from its bound."""
 EVERYWHERE: Any = AtPoints()
 
 
@@ -46,6 +48,7 @@ class Condition(Generic[Values, Place]):
     on: hovi.Between(lower, upper) or hovi.Equal(value).
     where: hovi.AtTimes(times) for a value at some times; left out for all times.
     name: in messages. unit: of y, in messages. of: names of its entries there, such as joints.
+    read: of a value of y what messages say, in that unit: such as the root, where y is a square.
     scale: of bounded y, one number or one for each entry: by default upper - lower, or
         max(1, |bound|) of a single bound. Bounds that are functions of time need it.
     tolerance: at least 1e-6: the fraction of the scale by which a bound may be exceeded anywhere;
@@ -65,6 +68,7 @@ class Condition(Generic[Values, Place]):
     tolerance: float = TOLERANCE
     of: Sequence[str] = ()
     during: tuple[float, float] | None = None
+    read: Callable[[float], float] | None = None
 
     def __post_init__(self) -> None:
         if not (isinstance(self.function, str | Function) or callable(self.function)):
@@ -111,6 +115,15 @@ class Condition(Generic[Values, Place]):
         """The function; of a condition `with_function`."""
         assert isinstance(self.function, Function)
         return self.function
+
+    def shown(self, y: float, digits: int = 6) -> str:
+        """A value or a bound as messages have it, in `unit`."""
+        return f"{float(y) if self.read is None or np.isinf(y) else self.read(y):.{digits}g}"
+
+    def shown_apart(self, y: float, bound: float) -> tuple[str, str]:
+        """A value and its bound in as few digits as tell one from the other."""
+        pairs = [(self.shown(y, n), self.shown(bound, n)) for n in DIGITS]
+        return next((pair for pair in pairs if pair[0] != pair[1]), pairs[0])
 
     @property
     def timed(self) -> bool:

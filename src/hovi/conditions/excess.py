@@ -83,12 +83,12 @@ def worst(motion: Trajectory, given: Condition[TwoSided, Any]) -> tuple[float, s
     sides, at = largest_excess(motion, given)
     side, k, entry = np.unravel_index(int(np.argmax(sides)), sides.shape)
     y, low, high, t = _values(motion, given, np.array([k]), at[side, [k], entry])
-    bound = (low, high)[side][0, entry]
+    value, bound = given.shown_apart(y[0, entry], (low, high)[side][0, entry])
     named = given.y.named(int(entry))
     subject, unit = named or (in_words(given, int(entry)), given.unit)
     return float(sides[side, k, entry]), (
-        f"{subject} reaches {y[0, entry]:.4g}{unit and f' {unit}'} at t = {t[0]:.3g} s, its "
-        f"{'limit' if named else 'bound'} is {bound:.4g}"
+        f"{subject} reaches {value}{unit and f' {unit}'} at t = {t[0]:.3g} s, its "
+        f"{'limit' if named else 'bound'} is {bound}"
     )
 
 

@@ -11,6 +11,7 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from hovi.discrete.trajectory import Trajectory
+from hovi.viewing.carried_objects import CarriedObjects
 from hovi.viewing.highlights import node_name
 from hovi.viewing.recorded_limits import MovingObjects
 
@@ -38,7 +39,36 @@ def placements_at(
         moving.place(visualizer, float(t))
         pin.updateGeometryPlacements(model, data, visual, visual_data, configuration)
         placements.append([placement.copy() for placement in visual_data.oMg])
+    carried = CarriedObjects.of(trajectory)
+    for number, poses in _resting(visualizer, trajectory, carried, times).items():
+        for at_time, pose in zip(placements, poses, strict=True):
+            at_time[number] = pose
     return placements
+
+
+def display_at(
+    visualizer: MeshcatVisualizer, trajectory: Trajectory, carried: CarriedObjects, t: float
+) -> None:
+    """Show the robot at a time, and what it carries where it lies then."""
+    visualizer.display(trajectory.configurations(t)[0])
+    for number, (pose,) in _resting(visualizer, trajectory, carried, np.array([t])).items():
+        item = visualizer.visual_model.geometryObjects[number]
+        visualizer.viewer[node_name(visualizer, item)].set_transform(pose.homogeneous)
+
+
+def _resting(
+    visualizer: MeshcatVisualizer, trajectory: Trajectory, carried: CarriedObjects, times: Array
+) -> dict[int, list[pin.SE3]]:
+    """Placements of what is carried in parts of the motion, by number: elsewhere it lies still."""
+    model, visual = visualizer.model, visualizer.visual_model
+    data, found = model.createData(), dict[int, list[pin.SE3]]()
+    for number, link in carried.drawn(model, visual).items():
+        item, poses = visual.geometryObjects[number], []
+        for q in trajectory.configurations(carried.rest(link, times)):
+            pin.forwardKinematics(model, data, q)
+            poses.append(data.oMi[item.parentJoint] * item.placement)
+        found[number] = poses
+    return found
 
 
 def frame_times(trajectory: Trajectory) -> Array:

@@ -19,7 +19,8 @@ from hovi.discrete.trajectory import Trajectory
 from hovi.errors import ModelError
 from hovi.robot.robot import Robot
 from hovi.system.dataclass import dataclass
-from hovi.viewing.animation import placements_at
+from hovi.viewing.animation import display_at, placements_at
+from hovi.viewing.carried_objects import CarriedObjects
 from hovi.viewing.highlights import Highlights
 from hovi.viewing.meshcat_page import Page
 from hovi.viewing.meshes.page_mesh import page_mesh
@@ -78,16 +79,17 @@ def drawn(
     others: Sequence[tuple[Trajectory, Robot]] = (),
 ) -> Drawn:
     """Draw the robot at the start of the motion, the paths of its tips, and others as ghosts."""
-    payloads = Payloads.of(trajectory)
+    payloads, carried = Payloads.of(trajectory), CarriedObjects.of(trajectory)
     visual = _shapes(robot)
     if highlights is not None:
-        visual = highlights.with_highlighted_copies(visual)
+        plain = carried.drawn(robot.model, visual)
+        visual = highlights.with_highlighted_copies(visual, plain)
     visual = with_obstacles(payloads.added_to(visual, robot), trajectory)
     viewer = meshcat.Visualizer(window=page)
     visualizer = _visualizer(robot, visual, viewer, "robot")
     tracks = payloads.changes(visualizer)
     MovingObjects.of(trajectory).place(visualizer, 0.0)
-    visualizer.display(trajectory.q[0])
+    display_at(visualizer, trajectory, carried, 0.0)
     for node, (_, flags) in tracks.items():
         viewer[node].set_property("visible", bool(flags[0]))
     if highlights is not None:

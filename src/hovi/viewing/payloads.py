@@ -15,6 +15,7 @@ from hovi.robot.model import frame_named
 from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
 from hovi.system.dataclass import dataclass
+from hovi.viewing.carried_objects import CarriedObjects
 
 if TYPE_CHECKING:
     from pinocchio.visualize import MeshcatVisualizer
@@ -39,15 +40,18 @@ class Payloads:
 
     @classmethod
     def of(cls, trajectory: Trajectory) -> Payloads:
-        """Those of the scene, or of the scenes of all segments."""
+        """Those of the scene, or of the scenes of all segments.
+
+        In a segment that carries objects, which are drawn, those of the one before it.
+        """
         parts = trajectory.segments
         scenes = [trajectory.scene] if parts is None else list(parts.scenes)
         carried = [_payloads(scene) for scene in scenes if scene is not None]
-        begins = (
-            np.array([segment.begin for segment in motion_segments(trajectory)])
-            if parts
-            else np.zeros(1)
-        )
+        begins = np.zeros(1)
+        if parts:
+            segments = motion_segments(trajectory)
+            begins, ends = np.array([each[1:3] for each in segments]).T
+            carried = _besides(carried, CarriedObjects.of(trajectory).acting(begins, ends))
         items = tuple(dict.fromkeys(item for each in carried for item in each))
         flags = [np.array([item in each for each in carried]) for item in items]
         return cls(items, tuple((begins, each) for each in flags))
@@ -80,6 +84,16 @@ class Payloads:
 
 def _name(k: int) -> str:
     return f"payload {k}"
+
+
+def _besides(carried: list[tuple[_Key, ...]], objects: Mask) -> list[tuple[_Key, ...]]:
+    """Payloads by segment, without the mass of objects. objects: whether it carries any, (S,)."""
+    alone = [each for each, also in zip(carried, objects, strict=True) if not also]
+    last, found = alone[0] if alone else (), list[tuple[_Key, ...]]()
+    for each, also in zip(carried, objects, strict=True):
+        last = last if also else each
+        found.append(last)
+    return found
 
 
 def _payloads(scene: Scene) -> tuple[_Key, ...]:

@@ -22,7 +22,8 @@ from hovi.robot.robot import Robot
 from hovi.system.dataclass import dataclass
 from hovi.system.files import reason, whole_file
 from hovi.system.terminal import has_browser, terminal_script, wait_at_exit, wait_for_interrupt
-from hovi.viewing.animation import animation_of, frame_times
+from hovi.viewing.animation import animation_of, display_at, frame_times
+from hovi.viewing.carried_objects import CarriedObjects
 from hovi.viewing.curves.given_motion import motion_in, motions_in
 from hovi.viewing.drawing import drawn, ghost_color
 from hovi.viewing.highlights import AT_LIMIT_NOTE, Highlights
@@ -101,18 +102,18 @@ class Replay:
 
     def _play_once(self, speed: float, rate: float) -> None:
         duration = self.trajectory.duration
-        moving = MovingObjects.of(self.trajectory)
+        moving, carried = MovingObjects.of(self.trajectory), CarriedObjects.of(self.trajectory)
         start, elapsed = time.monotonic(), 0.0
         while elapsed * speed < duration:
-            self._show(elapsed * speed, moving)
+            self._show(elapsed * speed, moving, carried)
             due = (math.floor(elapsed * rate) + 1) / rate
             time.sleep(max(0.0, start + min(due, duration / speed) - time.monotonic()))
             elapsed = time.monotonic() - start
-        self._show(duration, moving)
+        self._show(duration, moving, carried)
 
-    def _show(self, t: float, moving: MovingObjects) -> None:
+    def _show(self, t: float, moving: MovingObjects, carried: CarriedObjects) -> None:
         moving.place(self.visualizer, t)
-        self.visualizer.display(self.trajectory.configurations(t)[0])
+        display_at(self.visualizer, self.trajectory, carried, t)
         if self.highlights is not None:
             self.highlights.show(self.visualizer, t)
         for trajectory, ghost in self.ghosts:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import field, fields, replace
@@ -201,7 +202,8 @@ def distance_kept(
     def squared(q: ca.SX) -> ca.SX:
         return ca.sumsqr(offsets(q))
 
-    return Condition(squared, Between(upper=room**2), name=title, unit="m^2", scale=room**2)
+    on = Between(upper=room**2)
+    return Condition(squared, on, name=title, unit="m", scale=room**2, read=root)
 
 
 def direction_kept(
@@ -219,7 +221,17 @@ def direction_kept(
     if room < LEAST_ROOM * accepted:
         return _value(title, offsets, room, accepted, "rad")
     most = 4.0 * np.sin(min(room, np.pi) / 2) ** 2
-    return Condition(chord, Between(upper=most), name=title, scale=most)
+    return Condition(chord, Between(upper=most), name=title, unit="deg", scale=most, read=_angle)
+
+
+def root(square: float) -> float:
+    """A size of a square, which may be a rounding error below zero."""
+    return math.sqrt(max(square, 0.0))
+
+
+def _angle(chord: float) -> float:
+    """An angle in degrees of 2 (1 - cos) of it."""
+    return math.degrees(2.0 * math.asin(min(0.5 * root(chord), 1.0)))
 
 
 def _value(

@@ -11,7 +11,7 @@ import pinocchio as pin
 
 from hovi.checks.units import acceleration, angular_speed, speed
 from hovi.conditions.condition import Condition
-from hovi.conditions.kept.keep import Conditions, EndPoses, KeepFrame, placement
+from hovi.conditions.kept.keep import Conditions, EndPoses, KeepFrame, placement, root
 from hovi.conditions.places import AtPoints
 from hovi.conditions.sets import Between
 from hovi.effects.expressions.formula_symbols import frame_column
@@ -77,11 +77,11 @@ class ToolSpeed(KeepFrame):
             return ca.sumsqr(turn) / 2  # |w|^2 of R' = [w] R
 
         if self.linear is not None:
-            found.append(_at_most(speed(self.linear, self.subject), linear, self.title, "(m/s)^2"))
+            found.append(_at_most(speed(self.linear, self.subject), linear, self.title, "m/s"))
         if self.angular is not None:
             title = f"{self.title} (turn)" if found else self.title
             found.append(
-                _at_most(angular_speed(self.angular, self.subject), angular, title, "(rad/s)^2")
+                _at_most(angular_speed(self.angular, self.subject), angular, title, "rad/s")
             )
         return tuple(found)
 
@@ -107,9 +107,7 @@ class ToolAcceleration(KeepFrame):
         def squared(q: ca.SX, v: ca.SX, a: ca.SX) -> ca.SX:
             return ca.sumsqr(_derivative(robot, self.frame, q, v, a))
 
-        return (
-            _at_most(acceleration(self.linear, self.subject), squared, self.title, "(m/s^2)^2"),
-        )
+        return (_at_most(acceleration(self.linear, self.subject), squared, self.title, "m/s^2"),)
 
 
 def _derivative(robot: Robot, frame: str, q: ca.SX, v: ca.SX, a: ca.SX | None = None) -> ca.SX:
@@ -122,4 +120,5 @@ def _at_most(
     size: float, squared: Callable[..., ca.SX], title: str, unit: str
 ) -> Condition[Between, AtPoints]:
     """A size whose square is a function of the motion."""
-    return Condition(squared, Between(upper=size**2), name=title, unit=unit, scale=size**2)
+    on = Between(upper=size**2)
+    return Condition(squared, on, name=title, unit=unit, scale=size**2, read=root)

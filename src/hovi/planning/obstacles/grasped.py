@@ -41,17 +41,17 @@ _KINDS = {each.__name__.lower(): each for each in _SHAPES}
 @check_arguments_except("shape", "mass", "position", "rpy", "center", "inertia", "may_touch")
 @dataclass(frozen=True)
 class Grasped:
-    """A rigid body that moves with a link of the robot.
+    """A rigid body that moves with a link of the robot, or with the point of a tool there.
 
     It becomes a link of its own, so that it is kept clear of obstacles, has a frame that goals may
     name, is part of the dynamics and is drawn.
 
     shape: a hovi.Box, Sphere, Cylinder or Capsule in the object's frame, its table such as
         {"kind": "box", "size": ..., "position": ...}, or several of them.
-    frame: the link that carries it. mass: in [kg].
+    frame: the link that carries it, or a frame of `tools` there. mass: in [kg].
     name: of its link and frame.
-    position: of the object's frame in that of the link, shape (3,), in [m].
-    rpy: roll, pitch and yaw of the object's frame in that of the link, shape (3,), in [rad].
+    position: of the object's frame in that frame, shape (3,), in [m].
+    rpy: roll, pitch and yaw of the object's frame in that frame, shape (3,), in [rad].
     center: its center of mass in the object's frame, shape (3,), in [m].
     inertia: (Ixx, Iyy, Izz, Ixy, Ixz, Iyz) about that center in the object's axes, in [kg m^2].
         Both are by default those of a homogeneous body of that shape.
@@ -143,7 +143,7 @@ class Grasped:
 
     @property
     def placement(self) -> pin.SE3:
-        """The pose of the object's frame in that of the link."""
+        """The pose of the object's frame in the frame that carries it."""
         return pose_of(self.position, self.rpy)
 
     def payload(self) -> Payload:
@@ -172,7 +172,8 @@ def holding(
 
     grasped: a hovi.Grasped, a table in the words of a scene file, or a list of these. The same
         robot and objects give the same Robot.
-    Raises InputError for a frame that is no link, a name that exists, and a robot without a URDF.
+    Raises InputError for a frame that is no link or tool, a name that exists, and a robot without
+    a URDF.
     """
     expect(robot, Robot, "a robot of hovi.load_robot")
     return robot_holding(robot, as_grasped(grasped))
@@ -233,27 +234,32 @@ def robot_holding(robot: Robot, objects: tuple[Grasped, ...], massless: bool = F
             "be added; load it from a URDF."
         )
     links = [frame.name for frame in robot.model.frames if frame.type == pin.FrameType.BODY]
+    tools = {each.name: each for each in robot.source.tools}
     for each in objects:
         if each.name in robot.frame_names:
             raise InputError(
                 f"robot {robot.name!r} has a frame {each.name!r} already: give the grasped object "
                 "another name."
             )
-        if each.frame not in links:
+        link, placement = each.frame, each.placement
+        while link in tools:
+            link, placement = tools[link].frame, tools[link].placement * placement
+        if link not in links:
+            names = [*links, *tools]
             raise InputError(
-                f"grasped object {each.name!r} must be held by a link of robot {robot.name!r}, "
-                f"which has no {each.frame!r}: {nearest(each.frame, links)}"
+                f"grasped object {each.name!r} must be held by a link or a tool of robot "
+                f"{robot.name!r}, which has no {link!r}: {nearest(link, names)}"
             )
-        text = with_link(text, robot.source.reference, _link(each, massless))
+        text = with_link(text, robot.source.reference, _link(each, link, placement, massless))
     source = dataclasses.replace(robot.source, urdf=text, sha256=text_hash(text))
     return Robot(robot.name, build_model(source), source)
 
 
-def _link(grasped: Grasped, massless: bool) -> AddedLink:
+def _link(grasped: Grasped, parent: str, placement: pin.SE3, massless: bool) -> AddedLink:
     return AddedLink(
         name=grasped.name,
-        parent=grasped.frame,
-        placement=grasped.placement,
+        parent=parent,
+        placement=placement,
         body=None if massless else grasped.body,
         shapes=[part for each in grasped.shapes for part in _urdf_shapes(each)],
     )

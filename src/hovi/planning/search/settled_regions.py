@@ -102,5 +102,7 @@ def _saying(found: Solution) -> Solution:
 
 
 def _unsettled(best: Solution, steps: int) -> Solution:
+    if not best.success:
+        return dataclasses.replace(best, nit=steps)
     said = "The bounds of its region were not settled: a motion inside may cost less."
     return dataclasses.replace(best, nit=steps, message=f"{best.message} {said}")

@@ -38,10 +38,11 @@ def require_supported(problem: ProblemSummary, order: int) -> None:
     periodic = isinstance(problem.goal, Periodic)
     for each in problem.conditions:
         if isinstance(each.where, Along) and (order != 2 or periodic):
-            what = "a periodic motion" if periodic else f"a cost of order {order}"
+            what = "a periodic motion" if periodic else f"a cost of order {order} (smooth=True)"
             raise InputError(
                 f"condition {each.name!r} is an equation at all times, which {what} does not "
-                "support: leave it out, use hovi.AtTimes, or a hovi.Between with some room."
+                'support: leave it out, or give it room, such as within="2 mm", or a hovi.Between '
+                "or hovi.AtTimes in place of a hovi.Equal."
             )
     if limits is not None:
         limits.require_order(order)

@@ -79,13 +79,14 @@ def _outside(given: Inequality, box: dict[str, Bound], end: str) -> str:
     entry = int(np.argmax(over))
     if not over[entry] > given.tolerance:
         return ""
-    value = f"{least[entry]:.6g}"
+    value = given.shown(least[entry])
     if most[entry] > least[entry]:
-        value = f"between {value} and {most[entry]:.6g}"
+        value = f"between {value} and {given.shown(most[entry])}"
     unit = f" {given.unit}" if given.unit else ""
+    lower, upper = given.shown(low[entry]), given.shown(high[entry])
     return (
         f"{in_words(given, entry)} is {value}{unit} at the {end}, outside its bounds "
-        f"[{low[entry]:.6g}, {high[entry]:.6g}]; change the {end} or widen the bounds"
+        f"[{lower}, {upper}]; change the {end} or widen the bounds"
     )
 
 
