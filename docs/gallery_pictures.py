@@ -31,18 +31,20 @@ def scrape_motion(block: Any, variables: dict[str, Any], gallery: dict[str, Any]
     seen.update(map(id, motions))
     if not new:
         return ""
-    drawn: list[str] = []
+    drawn = dict[str, str]()
     if not variables.get("hovi_drawn") and new[-1].robot is not None:
         variables["hovi_drawn"] = True
-        drawn.append(next(variables["image_path_iterator"]))
-        draw_halfway(new[-1], Path(drawn[-1]))
+        picture = next(variables["image_path_iterator"])
+        draw_halfway(new[-1], Path(picture))
+        drawn[picture] = f"The robot {new[-1].robot.name} halfway through its motion"
     path = next(variables["image_path_iterator"])
     try:
         motion_figure(new[-1]).savefig(path, dpi=80)
-        drawn.append(path)
+        drawn[path] = f"Curves of the joints over the {new[-1].duration:.3g} s of the motion"
     except hovi.HoviError:  # a motion without torques between its nodes
         pass
-    return "\n".join(str(figure_rst([each], gallery["src_dir"])) for each in drawn)
+    shown = [figure_rst([path], gallery["src_dir"], words) for path, words in drawn.items()]
+    return "\n".join(map(str, shown))
 
 
 def draw_halfway(motion: hovi.Trajectory, path: Path) -> None:

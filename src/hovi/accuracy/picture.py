@@ -19,6 +19,8 @@ from hovi.robot.tip_frame import names_in_words
 from hovi.viewing.figures import write_figure
 
 OWN_FAMILY = "hovi"
+TEXT_SIZE = 14.0
+"""Of labels in the file of a picture, in points: it is read at half of its width on a page."""
 _LABELS = {
     "cost": "error of the cost, relative",
     "joints": "largest error of a joint [rad]",
@@ -28,6 +30,8 @@ _PEER_COLORS = ("#D55E00", "#E69F00", "#CC79A7", "#6b6b6b", "#009E73", "#8c510a"
 _MILLISECONDS = 1e3
 _ERROR_FLOOR = 1e-16  # drawn for smaller errors
 _COINCIDENT_DECADES = 0.3  # errors closer than this, in decades, share one label
+ERROR_LABELS = 7
+"""Largest number of labels of errors on an axis."""
 _MARKERS = "osD^vPhX<>"  # stars are choices of plan
 _CHOICE, _DEFAULT = "#d00000", "#ffb000"
 
@@ -38,7 +42,8 @@ def plot_work_precision(
     diagram: Diagram, path: str | os.PathLike[str], fastest: bool = False
 ) -> None:
     """Write `work_precision_figure` to a file: PNG, PDF or SVG. Raises DisplayError."""
-    write_figure(work_precision_figure(diagram, fastest), path)
+    with matplotlib.rc_context({"font.size": TEXT_SIZE}):
+        write_figure(work_precision_figure(diagram, fastest), path)
 
 
 def work_precision_figure(diagram: Diagram, fastest: bool = False) -> Figure:
@@ -53,7 +58,7 @@ def work_precision_figure(diagram: Diagram, fastest: bool = False) -> Figure:
     fastest: show the fastest repeat instead of the median, for a machine under other load.
     """
     warm = _fastest if fastest else _median
-    figure = Figure(figsize=(11.0, 9.0), layout="constrained")
+    figure = Figure(figsize=(11.0, 10.5), layout="constrained")
     panels = figure.subplots(2, 2)
     for ax, measure in zip(panels.flat, MEASURES, strict=False):
         _panel(ax, diagram, measure, warm)
@@ -61,14 +66,14 @@ def work_precision_figure(diagram: Diagram, fastest: bool = False) -> Figure:
         _choices(ax, diagram, measure, fastest)
         _default(ax, diagram, measure, fastest)
         _least_errors(ax, diagram, measure)
-        ax.set_xlabel(f"warm solve [ms of {diagram.clock} time]")
+        ax.set_xlabel(f"warm solve [ms, {diagram.clock}]")
     _panel(panels[1, 1], diagram, "cost", _cold)
-    panels[1, 1].set_xlabel(f"setup and first solve [ms of {diagram.clock} time]")
+    panels[1, 1].set_xlabel(f"setup and first solve [ms, {diagram.clock}]")
     for ax in panels.flat:
         if not np.isfinite(ax.dataLim.minpos).all():  # nothing to show, and no range of a log axis
             ax.set(xlim=(1.0, 10.0), ylim=(1e-3, 1.0))
     handles, labels = panels[0, 0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=4, frameon=False)
+    figure.legend(handles, labels, loc="outside lower center", ncols=3, frameon=False)
     figure.suptitle(_title(diagram), fontsize="medium")
     return figure
 
@@ -110,7 +115,8 @@ def _panel(ax: Axes, diagram: Diagram, measure: str, time: Time) -> None:
         ax.xaxis.set_minor_formatter("{x:g}")
     else:
         ax.xaxis.set_minor_formatter(NullFormatter())
-    ax.tick_params(axis="x", which="both", labelsize="small")
+    ax.tick_params(axis="x", which="minor", labelsize="small")
+    ax.yaxis.set_major_locator(LogLocator(numticks=ERROR_LABELS))
     tips = names_in_words(diagram.resolved.tip_frames)
     ax.set_ylabel(_LABELS[measure].format(tips=tips))
     ax.margins(y=0.08)  # for labels below stars
@@ -136,10 +142,10 @@ def _peer_family(
 ) -> None:
     runs = [run for run in diagram.runs if run.family == family and run.counts]
     x, y = _points(diagram, runs, measure, time)
-    ax.plot(x, y, ".", color=color, markersize=4, alpha=0.6)
+    ax.plot(x, y, ".", color=color, markersize=3, alpha=0.4)
     best = diagram.front(measure, lambda run: run.family == family, time)
     x, y = _points(diagram, best, measure, time)
-    ax.plot(x, y, "--", color=color, linewidth=1.6, label=family)
+    ax.plot(x, y, "--", color=color, linewidth=2.2, label=family)
 
 
 def _front(ax: Axes, diagram: Diagram, measure: str, time: Time) -> None:

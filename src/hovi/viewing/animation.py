@@ -60,8 +60,11 @@ def _resting(
     visualizer: MeshcatVisualizer, trajectory: Trajectory, carried: CarriedObjects, times: Array
 ) -> dict[int, list[pin.SE3]]:
     """Placements of what is carried in parts of the motion, by number: elsewhere it lies still."""
+    found = dict[int, list[pin.SE3]]()
+    if not carried.parts:
+        return found
     model, visual = visualizer.model, visualizer.visual_model
-    data, found = model.createData(), dict[int, list[pin.SE3]]()
+    data = model.createData()
     for number, link in carried.drawn(model, visual).items():
         item, poses = visual.geometryObjects[number], []
         for q in trajectory.configurations(carried.rest(link, times)):

@@ -129,6 +129,7 @@ def plan(
         line under the cell by default.
     options: a PlanOptions; the following keywords override it.
     on_iterate: called with a hovi.Iterate after every step, whose `solution` is the motion so far.
+        It sees no starts that run in worker processes: processes=1 keeps all of them here.
     cancel: a function without arguments, such as the `is_set` of a threading.Event: once it returns
         True, the plan ends as by Ctrl-C, with the best motion so far.
     {options}
