@@ -57,7 +57,8 @@ FLOOR = 1e-12
 class SequentialQuadratic(Method):
     """Sequential quadratic programming.
 
-    solver: of the quadratic programs: "piqp", "osqp", "proxqp" or "highs".
+    solver: of the quadratic programs: "piqp", or "osqp", "proxqp" or "highs" of CasADi's wheel,
+        which take far longer for arms.
     Raises InputError for another solver.
     """
 

@@ -116,6 +116,20 @@ def test_a_problem_without_limits_is_solved_by_it() -> None:
     assert found.cost == pytest.approx(known.cost, rel=1e-9)
 
 
+@pytest.mark.parametrize("solver", ["highs", "proxqp"])
+def test_other_solvers_of_quadratic_programs_end_there_too(solver: str) -> None:
+    """Of a small robot: they take long for arms."""
+    small = hovi.load_task(hovi.example("two_link_reach")).scene
+    grid = hovi.Grid.uniform(2.0, 6, hovi.schemes.by_name("galerkin-2"))
+    ld = hovi.DiscreteLagrangian(small.effort_lagrangian(), grid)
+    ends = hovi.State([0.0, 0.0]), hovi.State([0.6, 1.2])
+    limits = hovi.as_limits(small.robot, {"base": "none", "v": 1.0})
+    problem = hovi.TrajectoryProblem(ld, *ends, limits=limits)
+    found = [hovi.solve(problem, method=SequentialQuadratic(each)) for each in ("piqp", solver)]
+    assert found[0].status == found[1].status
+    assert found[0].cost == pytest.approx(found[1].cost, rel=1e-9)
+
+
 def test_matrices_are_those_of_differences() -> None:
     known = by_interior_point("ur5", 1)
     program = program_of(known)
