@@ -12,7 +12,7 @@ import pytest
 
 import hovi
 
-SUBPACKAGES = {"accuracy", "conditions", "effects", "schemes", "symbolic"}
+SUBPACKAGES = {"accuracy", "conditions", "effects", "methods", "schemes", "symbolic"}
 FIRST_PLAN = """
 import sys
 import hovi

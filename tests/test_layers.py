@@ -43,7 +43,7 @@ WITH_ORACLES = {
     "test_rules.py",
 }
 """Tests of what solvers are made of, by dense matrices and sampled curves, and the one door."""
-PUBLIC = {("accuracy",), ("conditions",), ("effects",), ("schemes",), ("symbolic",)}
+PUBLIC = {("accuracy",), ("conditions",), ("effects",), ("methods",), ("schemes",), ("symbolic",)}
 
 
 def is_below(imported: Module, module: Module) -> bool:

@@ -57,6 +57,7 @@ LONG = {
     "kkt_factors": ("kkt_factors.py",),
     "self_collision": ("self_collision.py", "--count", "12"),
     "hard_cases_long": ("hard_cases.py", "long"),
+    "methods": ("limits.py", "--methods"),
     "limited_reaches_ipopt": ("limited_reaches.py", "--ipopt"),
     "limited_reaches_rotors": ("limited_reaches.py", "kinova", "xarm7", "--armature", "0.1"),
 }

@@ -1,4 +1,4 @@
-"""hovi against CasADi and Ipopt: the same discrete problem, guess and thread, in one run.
+"""hovi against CasADi, Ipopt and Fatrop: the same discrete problem, guess and thread, in one run.
 
 Compiling and building are not counted. From the same guess different solvers may end in
 different minima, so their costs are printed; started at hovi's motion, Ipopt must not move.
@@ -12,6 +12,8 @@ from pathlib import Path
 
 import casadi as ca
 from measuring import alone, best_time, print_machine, print_table
+from random_arms import timed
+from stagewise import StageProgram
 from transcription import Transcription
 
 import hovi
@@ -45,7 +47,29 @@ def measure(scene: str, intervals: int) -> list[dict[str, object]]:
             solver = getattr(transcription, name)(*arguments)
             row = {"solver": f"Ipopt, {name}", "built": time.perf_counter() - began}
             rows.append(row | _peer(solver, transcription, solution))
-    return rows
+    return [*rows, _fatrop(problem, solution), _by_programs(problem, solution)]
+
+
+def _fatrop(problem: hovi.TrajectoryProblem, ours: hovi.Solution) -> dict[str, object]:
+    """Fatrop on the stage-wise form, with functions that CasADi interprets."""
+    began = time.perf_counter()
+    stages = StageProgram(problem)
+    built = time.perf_counter() - began
+    found, near = stages.solved("Fatrop"), stages.solved("Fatrop", ours.trajectory)
+    inside = f"{1e3 * (found.seconds - found.evaluations):.0f} ms of it Fatrop's own"
+    row = {"solver": f"Fatrop, interpreted, {inside}", "built": built, "cost": found.cost}
+    row |= {"steps": found.steps, "seconds": found.seconds}
+    return row | {"stays": abs(near.cost / ours.cost - 1)}
+
+
+def _by_programs(problem: hovi.TrajectoryProblem, ours: hovi.Solution) -> dict[str, object]:
+    """Sequential quadratic programs by PIQP, a second method of hovi's."""
+    method = hovi.methods.SequentialQuadratic()
+    seconds, found = timed(lambda: solve_on_grid(problem, method=method))
+    near = solve_on_grid(problem, ours.trajectory, method=method)
+    row = {"solver": f"SequentialQuadratic ({found.status})", "built": 0.0, "cost": found.cost}
+    row |= {"steps": found.nit, "seconds": seconds}
+    return row | {"stays": abs(near.cost / ours.cost - 1)}
 
 
 def _peer(solver: ca.Function, it: Transcription, ours: hovi.Solution) -> dict[str, object]:

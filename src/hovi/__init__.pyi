@@ -3,6 +3,7 @@
 from . import accuracy as accuracy
 from . import conditions as conditions
 from . import effects as effects
+from . import methods as methods
 from . import schemes as schemes
 from . import symbolic as symbolic
 from .conditions.condition import Condition as Condition

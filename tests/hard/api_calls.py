@@ -645,6 +645,8 @@ def _plans() -> list[Call]:
             **{"max_iterations": 2, "time_limit": 1.0, "escape_saddles": True, "report": None},
             method=None,
         ),
+        call(hovi.solve, problem(), max_iterations=2, method=hovi.methods.SequentialQuadratic()),
+        build(hovi.methods.SequentialQuadratic, solver="piqp"),
         own(solution(), "replan", [0.0, 0.0], [0.3, 0.6], None),
         own(solution(), "replan", goal=[0.3, 0.6], time_limit=1.0, max_iterations=2),
         own(

@@ -24,7 +24,7 @@ LEFT_OUT = {
     # needs an optional library, and has tests of its own
     "replay_in_mujoco",
     # packages, of which the members are called
-    *("accuracy", "conditions", "effects", "schemes", "symbolic"),
+    *("accuracy", "conditions", "effects", "methods", "schemes", "symbolic"),
 }
 
 

@@ -17,7 +17,7 @@ FLOORS = [
     {"_native", "errors", "system", "version"},
     {"checks", "workers"},
     {"optimize", "robot", "schemes"},
-    {"dynamics"},
+    {"dynamics", "methods"},
     {"effects"},
     {"scene"},
     {"discrete"},

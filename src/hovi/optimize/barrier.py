@@ -30,6 +30,9 @@ SCALE_PER_MU = 10.0
 """Scale of the multipliers where none is given, relative to mu."""
 LEAST_GAP = 1e-16
 """Least distance of a slack from its bounds."""
+REACHED = 1e-9
+"""Distance of a slack from a bound that its output reaches, where forces are given, relative to the
+range."""
 MAX_DUAL_RATIO = 1e8
 """Largest ratio, either way, of a multiplier and mu over its gap."""
 FRACTION_TO_BOUNDARY = 0.99
@@ -62,6 +65,10 @@ class Bounds:
         """Bounds that are further inside, by at most a quarter of their distance."""
         inside = np.minimum(room, MOST_MARGIN * (self.upper - self.lower))
         return dataclasses.replace(self, lower=self.lower + inside, upper=self.upper - inside)
+
+    def excess(self, y: Array) -> Array:
+        """By how much outputs are outside of their bounds, 0 inside, shape (R,)."""
+        return np.maximum(np.maximum(self.lower - y, y - self.upper), 0.0)
 
     @property
     def has_lower(self) -> Mask:
@@ -136,6 +143,17 @@ class Barrier:
         none = np.zeros_like(y)
         return cls(bounds, y, none, none, 0.0, 1.0)
 
+    @classmethod
+    def of_forces(cls, bounds: Bounds, y: Array, z: Array, mu: float, scale: float) -> Barrier:
+        """With given forces zu - zl = z at outputs that are within their bounds to rounding.
+
+        Slacks are at the outputs, and next to the bounds that z holds or y reaches.
+        """
+        gap = np.clip(mu / np.maximum(np.abs(z), np.finfo(float).tiny), LEAST_GAP, REACHED)
+        gap = np.minimum(gap, MOST_MARGIN * (bounds.upper - bounds.lower))
+        s = np.clip(y, bounds.lower + gap, bounds.upper - gap)
+        return cls(bounds, s, np.maximum(-z, 0.0), np.maximum(z, 0.0), mu, scale)._clipped()
+
     def refined(
         self, bounds: Bounds, y: Array, kept: Index, origin: Index, before: Array
     ) -> Barrier:
@@ -178,9 +196,8 @@ class Barrier:
         return dataclasses.replace(self, bounds=bounds, s=s)
 
     def outside(self, y: Array) -> Array:
-        """How far outputs are outside their bounds, 0 inside, shape (R,)."""
-        beyond = np.maximum(self.bounds.lower - y, y - self.bounds.upper)
-        return np.maximum(beyond, 0.0)
+        """See Bounds.excess."""
+        return self.bounds.excess(y)
 
     @property
     def multipliers(self) -> Array:

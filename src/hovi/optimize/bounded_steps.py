@@ -12,9 +12,9 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.optimize.barrier import Barrier, Direction, Pair
-from hovi.optimize.bounded_objective import BoundedObjective
 from hovi.optimize.criteria import Criteria
 from hovi.optimize.ended import Ended
+from hovi.optimize.program import Program
 from hovi.optimize.quadratic_model import (
     ACCEPTED_RATIO,
     AT_RADIUS,
@@ -109,7 +109,7 @@ class BoundedSteps(Generic[X]):
 
     def __init__(
         self,
-        objective: BoundedObjective[X],
+        objective: Program[X],
         ended: Ended[X, Barrier],
         criteria: Criteria,
         density: float,
@@ -129,7 +129,7 @@ class BoundedSteps(Generic[X]):
         """The model at the current point, whose multipliers of the bounds steps start from.
 
         Where it is not convex, the objective may replace it by one that is not `exact`: see
-        BoundedObjective.model_without_concavity.
+        Program.model_without_concavity.
         """
         ended = self.ended
         sigma, rho, force = ended.z.condensed(ended.outputs.y)

@@ -24,7 +24,7 @@ class Criteria:
         remains after it is of the order of its square.
     step: stop when a Newton step is smaller than this, relative to the data.
     max_iterations: number of steps, rejected ones included. time_limit: in [s], or None.
-    radius: first radius of the trust region, in the metric; with bounds: BoundedObjective.radii.
+    radius: first radius of the trust region, in the metric; with bounds: Program.radii.
     escape_saddles: leave a saddle along negative curvature; False stops there.
     exact: stop only where rounding alone remains, after a Newton step of an exact model.
     barrier: its last parameter, relative to the mean density of the objective.

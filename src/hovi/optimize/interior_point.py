@@ -39,12 +39,12 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.optimize.barrier import Barrier, Direction
-from hovi.optimize.bounded_objective import BoundedObjective, Refinement
 from hovi.optimize.bounded_steps import LAST_MU, SHORT_FRACTION, BoundedStep, BoundedSteps
 from hovi.optimize.criteria import Criteria
 from hovi.optimize.ended import FEASIBILITY_TOLERANCE, Ended, Iteration, Outputs, Reason
 from hovi.optimize.kkt_model import size_of
 from hovi.optimize.observed import between_steps
+from hovi.optimize.program import Program, Refinement
 from hovi.optimize.quadratic_model import (
     ACCEPTED_RATIO,
     QuadraticModel,
@@ -116,7 +116,7 @@ MAX_SADDLES = 5
 
 
 def minimize_bounded(
-    objective: BoundedObjective[X],
+    objective: Program[X],
     start: Start[X, Barrier],
     criteria: Criteria,
     report: Callable[[int, float], None] | None = None,
@@ -153,7 +153,7 @@ class _Iteration(BoundedSteps[X]):
 
     def __init__(
         self,
-        objective: BoundedObjective[X],
+        objective: Program[X],
         ended: Ended[X, Barrier],
         criteria: Criteria,
         density: float,

@@ -24,10 +24,10 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.optimize.barrier import Barrier
-from hovi.optimize.bounded_objective import BoundedObjective
 from hovi.optimize.criteria import ROOM, Criteria
 from hovi.optimize.ended import Ended, Iteration, Reason
 from hovi.optimize.observed import between_steps
+from hovi.optimize.program import Program
 from hovi.optimize.quadratic_model import QuadraticModel
 from hovi.optimize.start import Start
 
@@ -48,7 +48,7 @@ iteration does not converge."""
 
 
 def follow_bounded(
-    objective: BoundedObjective[X],
+    objective: Program[X],
     start: Start[X, Barrier],
     criteria: Criteria,
     report: Callable[[int, float], None] | None = None,
@@ -74,7 +74,7 @@ class _Newton(Generic[X]):
 
     def __init__(
         self,
-        objective: BoundedObjective[X],
+        objective: Program[X],
         ended: Ended[X, Barrier],
         criteria: Criteria,
         report: Callable[[int, float], None] | None,

@@ -18,6 +18,7 @@ from hovi.discrete.grid import DiscretePath
 from hovi.discrete.measures.motion_error import relative_difference
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import HoviError
+from hovi.methods.method import Method
 from hovi.optimize.criteria import MAX_ITERATIONS
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.refinement.candidate import ROUNDING_FLOOR, error_of_cost
@@ -39,7 +40,7 @@ from hovi.planning.refinement.faults.on_curve import (
 from hovi.planning.refinement.faults.remedy import remedy
 from hovi.planning.refinement.limit_sensitivity import cost_of_tolerance, limit_prices
 from hovi.planning.refinement.spinning import fault_of_valley, spin
-from hovi.planning.solver.methods.method import Method, Report
+from hovi.planning.solver.methods.method import ProblemMethod, Report
 from hovi.planning.solver.methods.stationary import Stationary
 from hovi.planning.solver.outcome.cost_with_time import cost_of
 from hovi.planning.solver.outcome.judge import judged, without_success
@@ -85,7 +86,7 @@ def solve(
     time_limit: float | None = None,
     escape_saddles: bool = True,
     report: Report | None = None,
-    method: Method | None = None,
+    method: Method | ProblemMethod | None = None,
     seek: Literal["minimum", "stationary"] = "minimum",
 ) -> Solution:
     """A motion that makes the discrete action stationary, checked between the quadrature points.
@@ -99,8 +100,8 @@ def solve(
     escape_saddles: whether to leave saddles along negative curvature; False stops there with
         status SADDLE.
     report: called with the number of each step and the least cost so far.
-    method: minimisation method; None for the first suitable one of
-        hovi.planning.solver.methods.choice.
+    method: a member of hovi.methods, or a method of your own (hovi.methods.Method); None for the
+        first suitable one of hovi.planning.solver.methods.choice.
     seek: "stationary" for a stationary point of any index near the guess, whose n_neg is its Morse
         index and whose status is STATIONARY; for problems without limits, obstacles and equations.
     With limits, `cost` belongs to the motion that satisfies them everywhere, and intervals may

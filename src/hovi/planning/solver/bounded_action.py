@@ -20,9 +20,11 @@ from hovi.discrete.grid import DiscretePath
 from hovi.errors import InputError
 from hovi.optimize.banded_model import BandModel
 from hovi.optimize.barrier import Bounds
-from hovi.optimize.bounded_objective import BoundedObjective, Refinement
 from hovi.optimize.ended import Outputs
+from hovi.optimize.equation_model import EquationModel
+from hovi.optimize.program import Program, Refinement
 from hovi.optimize.quadratic_model import QuadraticModel
+from hovi.optimize.quadratic_program import QuadraticProgram
 from hovi.planning.problem.limits import Limits, limited_columns
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.action_objective import ActionObjective, LinearAlgebra
@@ -36,7 +38,7 @@ Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]
 
 
-class BoundedAction(BoundedObjective[DiscretePath]):
+class BoundedAction(Program[DiscretePath]):
     """The discrete action, with (q, v, a, tau), or more, bounded at the quadrature points.
 
     What `rows` bound is bounded at all times instead. Further outputs of the motion, such as
@@ -143,7 +145,7 @@ class BoundedAction(BoundedObjective[DiscretePath]):
     def model(
         self, x: DiscretePath, sigma: Array, rho: Array, multipliers: Array
     ) -> QuadraticModel:
-        """The model of the action with the terms of the bounds: see BoundedObjective.model."""
+        """The model of the action with the terms of the bounds: see Program.model."""
         if self.penalty == 0.0:
             return self._model(x, sigma, rho, multipliers)
         self.hold(self.penalty * self.residual(x))
@@ -270,6 +272,38 @@ class BoundedAction(BoundedObjective[DiscretePath]):
         padded = np.pad(more, ((0, 0), (0, others)))
         return [each + padded[part] for each, part in zip(curvatures, self._parts, strict=True)]
 
+    def quadratic(
+        self,
+        x: DiscretePath,
+        forces: Array,
+        sigma: Array | None = None,
+        rho: Array | None = None,
+    ) -> QuadraticProgram:
+        """See Program.quadratic; for grids whose model is a band."""
+        self.predict([])
+        none = np.zeros_like(forces)
+        model = self.model(
+            x, none if sigma is None else sigma, none if rho is None else rho, forces
+        )
+        if not isinstance(model, BandModel | EquationModel):
+            raise InputError(
+                "a quadratic program needs a grid of at most 1,000 intervals; use fewer."
+            )
+        rows = self.output_intervals, self.output_slopes(model.intervals.gradient.shape)
+        return QuadraticProgram.of(model, self.bounds, self.outputs(x).y, rows)
+
+    def output_slopes(self, shape: tuple[int, ...]) -> Array:
+        """Slopes of the outputs in the columns of their intervals, (R, m, n).
+
+        shape: (N, m, n), of the columns of all intervals.
+        """
+        slopes = np.zeros((len(self.bounds.lower), *shape[1:]))
+        for c, i in np.ndindex(*shape[1:]):
+            one = np.zeros(shape)
+            one[:, c, i] = 1.0
+            slopes[:, c, i] = self.push_columns(one)
+        return slopes
+
     def push(self, step: Array, model: QuadraticModel) -> Array:
         """First-order change of the bounded outputs, shape (R,)."""
         return self.push_columns(model.gather(step))
@@ -361,12 +395,12 @@ class BoundedAction(BoundedObjective[DiscretePath]):
         self._predicted = slopes or None
 
     def hold(self, change: Array) -> None:
-        """See BoundedObjective.hold."""
+        """See Program.hold."""
         self._before_hold = self.action.multipliers
         self.action.hold(change)
 
     def let_go(self) -> None:
-        """See BoundedObjective.let_go."""
+        """See Program.let_go."""
         self.action.multipliers = self._before_hold
 
     def residual(self, x: DiscretePath) -> Array:
@@ -379,11 +413,14 @@ class BoundedAction(BoundedObjective[DiscretePath]):
             return True
         return within(self.action.residuals(x), *self.tolerances)
 
-    def refine(self, x: DiscretePath, level: float) -> Refinement | None:
+    def refine(
+        self, x: DiscretePath, level: float, forces: Array | None = None
+    ) -> Refinement | None:
         """Bound more control points of the motion: see LimitRows."""
         if self.rows is None:
             return None
-        found = self.rows.refine(x, level)
+        known = None if forces is None else self.plain(forces)[self.row_outputs]
+        found = self.rows.refine(x, level, known)
         if found is None:
             return None
         self._with_rows()

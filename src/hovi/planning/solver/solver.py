@@ -24,6 +24,7 @@ from hovi.discrete.measures.motion_segments import with_segment_names
 from hovi.discrete.state import Periodic
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError
+from hovi.methods.method import Method
 from hovi.optimize.criteria import MAX_ITERATIONS, Criteria
 from hovi.optimize.ended import STOPS, Iteration, Reason, why_stopped
 from hovi.optimize.quadratic_model import QuadraticModel
@@ -36,7 +37,7 @@ from hovi.planning.solver.answer import Answer
 from hovi.planning.solver.initial_path import guess_path, turned_on
 from hovi.planning.solver.limits.row_forces import at_instants
 from hovi.planning.solver.methods.choice import method_for
-from hovi.planning.solver.methods.method import Method, Report
+from hovi.planning.solver.methods.method import ProblemMethod, Report
 from hovi.planning.solver.methods.stationary import Stationary
 from hovi.planning.solver.outcome.ends import starts_there
 from hovi.planning.solver.outcome.judge import judged
@@ -402,7 +403,7 @@ def solve_on_grid(
     time_limit: float | None = None,
     escape_saddles: bool = True,
     report: Report | None = None,
-    method: Method | None = None,
+    method: Method | ProblemMethod | None = None,
     barrier: float = LAST_BARRIER,
 ) -> Solution:
     """A motion that makes the discrete action stationary, without a check between the points.
@@ -414,8 +415,8 @@ def solve_on_grid(
     Other arguments, cost and errors as of `hovi.solve`, which checks the motion.
     """
     began = time.perf_counter()
-    method = method or method_for(problem)
-    if not method.supports(problem):
+    by = _for_problems(method) if method else method_for(problem)
+    if not by.supports(problem):
         raise InputError(
             f"method {type(method).__name__} does not support this problem; leave `method` out."
         )
@@ -432,7 +433,7 @@ def solve_on_grid(
     started, start = time.perf_counter(), dataclasses.replace(begun, x=path)
     try:
         with Deadline(time_limit).in_force():
-            result = method.minimize(problem, start, criteria, report)
+            result = by.minimize(problem, start, criteria, report)
     except STOPS as stopped:
         result = _the_guess(problem, path, why_stopped(stopped))
     return solution_of(result, started - began, time.perf_counter() - started)
@@ -463,6 +464,15 @@ def solution_of(result: Answer, setup_seconds: float = 0.0, solve_seconds: float
         model=result.model,
         solved_bounds=result.solved_bounds,
     )
+
+
+def _for_problems(method: Method | ProblemMethod) -> ProblemMethod:
+    """A method that solves problems, by the programs of a problem if it is one for these."""
+    if isinstance(method, ProblemMethod):
+        return method
+    from hovi.planning.solver.methods.interior_point import InteriorPoint  # as in choice.py
+
+    return InteriorPoint(method=method)
 
 
 def _the_guess(problem: TrajectoryProblem, path: DiscretePath, why: Reason) -> Answer:

@@ -6,8 +6,8 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.discrete.grid import DiscretePath
-from hovi.optimize.bounded_objective import BoundedObjective, Refinement
 from hovi.optimize.ended import Outputs
+from hovi.optimize.program import Program, Refinement
 from hovi.optimize.quadratic_model import QuadraticModel
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.problem.time_price import TimePrice
@@ -25,7 +25,7 @@ DURATION_METRIC = 400.0
 motions may be within the limits at all."""
 
 
-class TimedBoundedAction(BoundedObjective[TimedPath]):
+class TimedBoundedAction(Program[TimedPath]):
     """S(x, L) + w sum L in the columns x of the path and log L, with bounded outputs.
 
     The points have the weights h w of the first lengths L0: those of the barrier do not depend on
@@ -91,11 +91,11 @@ class TimedBoundedAction(BoundedObjective[TimedPath]):
 
     @property
     def may_be_concave(self) -> bool:
-        """See BoundedObjective."""
+        """See Program."""
         return self.first.may_be_concave
 
     def model(self, x: TimedPath, sigma: Array, rho: Array, multipliers: Array) -> TimedModel:
-        """The bordered model with the terms of the bounds: see BoundedObjective.model."""
+        """The bordered model with the terms of the bounds: see Program.model."""
         at, fraction = self.at(x.lengths), self.fraction(x.lengths)
         at.predict(self._slopes)
         self._terms = sigma, rho, multipliers
@@ -103,7 +103,7 @@ class TimedBoundedAction(BoundedObjective[TimedPath]):
         return self._bordered(x, inner)
 
     def model_without_concavity(self, x: TimedPath) -> QuadraticModel | None:
-        """See BoundedObjective."""
+        """See Program."""
         inner = self.at(x.lengths).model_without_concavity(x.path)
         return None if inner is None else self._bordered(x, inner)
 
@@ -147,28 +147,28 @@ class TimedBoundedAction(BoundedObjective[TimedPath]):
         self._slopes = model.predicted_slopes(step)
 
     def hold(self, change: Array) -> None:
-        """See BoundedObjective.hold; other lengths take the multipliers over."""
+        """See Program.hold; other lengths take the multipliers over."""
         self.first.hold(change)
 
     def let_go(self) -> None:
-        """See BoundedObjective.let_go."""
+        """See Program.let_go."""
         self.first.let_go()
 
     def residual(self, x: TimedPath) -> Array:
-        """See BoundedObjective.residual."""
+        """See Program.residual."""
         return self.at(x.lengths).residual(x.path)
 
     def satisfies_equations(self, x: TimedPath) -> bool:
         """Whether equations hold to their tolerances."""
         return self.at(x.lengths).satisfies_equations(x.path)
 
-    def refine(self, x: TimedPath, level: float) -> Refinement | None:
+    def refine(self, x: TimedPath, level: float, forces: Array | None = None) -> Refinement | None:
         """Bound more of the motion: see BoundedAction."""
         at = self.at(x.lengths)
-        return self._refined(x, at, at.refine(x.path, level))
+        return self._refined(x, at, at.refine(x.path, level, forces))
 
     def refine_at_once(self, x: TimedPath) -> Refinement | None:
-        """See BoundedObjective."""
+        """See Program."""
         at = self.at(x.lengths)
         return self._refined(x, at, at.refine_at_once(x.path))
 

@@ -23,7 +23,7 @@ from hovi.discrete.grid import DiscretePath, Grid
 from hovi.discrete.instants import Instants
 from hovi.discrete.interval_batch import Coordinates
 from hovi.discrete.interval_paths import scaled_data
-from hovi.optimize.bounded_objective import Refinement
+from hovi.optimize.program import Refinement
 from hovi.planning.problem.limits import Limits
 from hovi.planning.problem.way_back.excused import Excused
 from hovi.planning.solver.limits.graded_parts import graded
@@ -206,31 +206,37 @@ class LimitRows:
             self._nodal = np.ascontiguousarray(nodal)
         return self._nodal
 
-    def refine(self, path: DiscretePath, level: float) -> Refinement | None:
+    def refine(
+        self, path: DiscretePath, level: float, forces: Array | None = None
+    ) -> Refinement | None:
         """Halve parts whose control points, away from the curve, raise the cost; None if none do.
 
         level: barrier parameter at the path, relative to the mean density of the cost.
+        forces: |z| of the rows, relative to the same, (E,); None for the level over their slacks.
+        Parts that are halved are halved once then, since the forces of new rows are not known.
         """
         if self.fixed or self.size == 0:
             return None
-        coarse = self._coarse(path, level)
+        coarse = self._coarse(path, level, forces)
         if not coarse.any():
             return None
         numbers, before = np.arange(self.size), self._places
         for _ in range(MAX_HALVINGS):
             numbers = self._halve(coarse, numbers)
+            if forces is not None:
+                break
             coarse = self._coarse(path, level)
             if not coarse.any():
                 break
         kept = numbers[numbers >= 0]
         return Refinement(kept, self._origins(before, len(kept)))
 
-    def _coarse(self, path: DiscretePath, level: float) -> Mask:
+    def _coarse(self, path: DiscretePath, level: float, forces: Array | None = None) -> Mask:
         """Which parts are worth halving, shape (L,)."""
         y, (lower, upper) = self.values(path), self.bounds
         outside = push_rows(self, self._beyond, self._data(path))
         slack = np.maximum(np.where(outside > 0, upper - y, y - lower), LEAST_SLACK)
-        gap, force = np.abs(outside), level / slack
+        gap, force = np.abs(outside), level / slack if forces is None else forces
         loss = self.weights / self.grid.duration * force * gap
         coarse = np.zeros(len(self.parts), dtype=bool)
         if loss.sum() > self.max_loss:

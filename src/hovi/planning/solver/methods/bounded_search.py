@@ -12,6 +12,8 @@ from hovi.conditions.excess import excess_of, worst
 from hovi.conditions.places import AtPoints
 from hovi.discrete.grid import DiscretePath
 from hovi.discrete.instants import Instants
+from hovi.methods.judged_end import minimized_by
+from hovi.methods.method import Method
 from hovi.optimize.banded_model import BandModel
 from hovi.optimize.barrier import INITIAL_MARGIN, Barrier
 from hovi.optimize.criteria import Criteria
@@ -92,6 +94,7 @@ class BoundedSearch:
     along, level: central path of a similar problem, if there is one on as many intervals, and the
         barrier parameter at which it is begun: see Start.
     lengths: of the free parts of the problem, in [s]; none where its times are given.
+    method: which minimises instead of the interior point; None for that.
     """
 
     free_duration: ClassVar[bool] = False
@@ -105,6 +108,7 @@ class BoundedSearch:
     unmet: str = ""
     at_level: bool = False
     lengths: Array = dataclasses.field(default_factory=lambda: np.zeros(0))
+    method: Method | None = None
 
     def __post_init__(self) -> None:
         self.deadline = Deadline(self.criteria.time_limit)
@@ -117,6 +121,8 @@ class BoundedSearch:
         self.margins = self.no_margins()
         if self.along is not None and not self.along.fits(self.problem.grid):
             self.along = None  # a round before has halved intervals
+        if self.method is not None:
+            self.along = None  # which is one of the interior point
         self.along = self.along and self.along.from_ends_of(self.problem)
         known = self.along and self.along.rows
         self.rows = known.copied() if known else self.coarse_rows()
@@ -286,7 +292,11 @@ class BoundedSearch:
         raise_if_late()  # the outputs at the guess alone may take seconds
         if start.z is not None and len(start.z.s) != len(objective.bounds.lower):
             start = Start(start.x)  # rows were added in a solve that failed
-        return self._noted(minimize_bounded(objective, start, criteria, self.report), objective)
+        if self.method is None:
+            ended = minimize_bounded(objective, start, criteria, self.report)
+        else:
+            ended = minimized_by(self.method, objective, start, criteria, self.report)
+        return self._noted(ended, objective)
 
     def followed(self, objective: BoundedAction, start: Begun, criteria: Criteria) -> Bounded:
         """A solve of an objective from the solution of a similar problem: see follow_bounded."""

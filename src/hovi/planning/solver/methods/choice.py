@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from hovi.planning.problem.problem import TrajectoryProblem
-from hovi.planning.solver.methods.method import Method
+from hovi.planning.solver.methods.method import ProblemMethod
 from hovi.planning.solver.methods.trust_region import TrustRegion
 
 
-def all_methods() -> Iterator[Method]:
+def all_methods() -> Iterator[ProblemMethod]:
     """In order of cost; every problem is supported by one of them.
 
     Each is imported when it is its turn: most problems need the first one only.
@@ -26,6 +26,6 @@ def all_methods() -> Iterator[Method]:
     yield InteriorPoint()
 
 
-def method_for(problem: TrajectoryProblem) -> Method:
+def method_for(problem: TrajectoryProblem) -> ProblemMethod:
     """The first method that supports a problem."""
     return next(method for method in all_methods() if method.supports(problem))

@@ -13,12 +13,12 @@ from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.answer import Answer
 from hovi.planning.solver.methods.interior_point import InteriorPoint
 from hovi.planning.solver.methods.lagrange_newton import LagrangeNewton
-from hovi.planning.solver.methods.method import Guess, Method, Report
+from hovi.planning.solver.methods.method import Guess, ProblemMethod, Report
 from hovi.planning.solver.methods.trust_region import TrustRegion
 from hovi.planning.solver.status import Status, unfinished
 from hovi.system.deadline import Deadline
 
-WITHOUT_LIMITS: tuple[Method, ...] = (TrustRegion(), LagrangeNewton())
+WITHOUT_LIMITS: tuple[ProblemMethod, ...] = (TrustRegion(), LagrangeNewton())
 """Methods for problems without limits."""
 SOLVED = Status.MINIMUM, Status.SADDLE
 """Statuses of motions that may be kept."""
@@ -26,7 +26,7 @@ ENDED = Status.INFEASIBLE, Status.TIME_LIMIT, Status.INTERRUPTED
 """Statuses after which distances are not looked at."""
 
 
-class FreeFirst(Method):
+class FreeFirst(ProblemMethod):
     """The method without limits, then the one within limits from its motion.
 
     The second one is left out where the motion without distances is one that keeps them, and where
@@ -44,7 +44,7 @@ class FreeFirst(Method):
         criteria: Criteria,
         report: Report | None = None,
     ) -> Answer:
-        """See Method.minimize."""
+        """See ProblemMethod.minimize."""
         known = start.z is not None  # from a motion that distances held
         if known or contradiction(problem, no_limits(problem.coordinates)):
             return InteriorPoint().minimize(problem, start, criteria, report)

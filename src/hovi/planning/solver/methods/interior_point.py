@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hovi.discrete.grid import DiscretePath
+from hovi.methods.method import Method
 from hovi.optimize.criteria import Criteria
 from hovi.optimize.ended import STOPPED, STOPS, Reason, why_stopped
 from hovi.planning.problem.contradictions import contradiction
@@ -14,7 +15,7 @@ from hovi.planning.solver.answer import Answer
 from hovi.planning.solver.methods.bounded_search import BoundedSearch
 from hovi.planning.solver.methods.feasibility import feasible_motion
 from hovi.planning.solver.methods.limits_between_points import tightened, usable
-from hovi.planning.solver.methods.method import Guess, Method, Report
+from hovi.planning.solver.methods.method import Guess, ProblemMethod, Report
 from hovi.planning.solver.missed_equations import missed_sentence
 from hovi.planning.solver.non_finite import non_finite_condition, non_finite_sentence
 from hovi.planning.solver.outcome.cost_with_time import cost_of
@@ -29,20 +30,25 @@ from hovi.system.dataclass import dataclass
 
 
 @dataclass(frozen=True)
-class InteriorPoint(Method):
+class InteriorPoint(ProblemMethod):
     """A primal-dual interior-point method, whose steps satisfy equations to first order.
 
     First a motion within bounds at the quadrature points is found; then bounds are tightened and
     intervals halved until the limits hold everywhere to their tolerance.
 
     free: what was found without distances, whose steps count; None where that was not looked for.
+    method: another one that minimises the programs, and whose ends are judged; None for none.
     """
 
     free: Answer | None = None
+    method: Method | None = None
 
     def supports(self, problem: TrajectoryProblem) -> bool:
-        """Problems with limits or obstacles, with or without equality constraints."""
-        return problem.limited
+        """Problems with limits or obstacles, with or without equality constraints.
+
+        By another method, all problems without distances to obstacles or between links.
+        """
+        return problem.limited if self.method is None else problem.distances is None
 
     def minimize(
         self,
@@ -51,13 +57,13 @@ class InteriorPoint(Method):
         criteria: Criteria,
         report: Report | None = None,
     ) -> Answer:
-        """See Method.minimize; intervals may be split."""
+        """See ProblemMethod.minimize; intervals may be split."""
         limits = problem.limits or no_limits(problem.coordinates)
         reason = contradiction(problem, limits)
         if reason:
             said = infeasible_sentence(reason, problem)
             return Answer.at(problem, start.x, Status.INFEASIBLE, said)
-        search = BoundedSearch(problem, limits, criteria, report, start)
+        search = BoundedSearch(problem, limits, criteria, report, start, method=self.method)
         if self.free is not None:
             search.goes_on_from(self.free)
         try:

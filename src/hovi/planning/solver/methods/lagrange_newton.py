@@ -20,7 +20,7 @@ from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.answer import Answer
 from hovi.planning.solver.bounded_action import BoundedAction
 from hovi.planning.solver.constrained_action import ConstrainedAction
-from hovi.planning.solver.methods.method import Guess, Method, Report
+from hovi.planning.solver.methods.method import Guess, ProblemMethod, Report
 from hovi.planning.solver.missed_equations import (
     FEASIBLE_RESIDUAL,
     missed_sentence,
@@ -41,7 +41,7 @@ FIRST_DECREASE = 1e-3
 """Relative decrease at which a minimisation with a penalty stops."""
 
 
-class LagrangeNewton(Method):
+class LagrangeNewton(ProblemMethod):
     """Newton's method on the KKT equations.
 
     With equations at nodes alone, such as frame goals, a minimisation with a penalty leads from the
@@ -59,7 +59,7 @@ class LagrangeNewton(Method):
         criteria: Criteria,
         report: Report | None = None,
     ) -> Answer:
-        """See Method.minimize."""
+        """See ProblemMethod.minimize."""
         if problem.unreachable:
             said = f"{problem.unreachable}."
             return Answer.at(problem, start.x, Status.INFEASIBLE, said)

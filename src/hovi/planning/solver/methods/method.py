@@ -21,7 +21,7 @@ Report = Callable[[int, float], None]
 """Called with the number of each step and the least cost so far."""
 
 
-class Method(ABC):
+class ProblemMethod(ABC):
     """A method that minimises the action, for some kinds of problems."""
 
     @abstractmethod

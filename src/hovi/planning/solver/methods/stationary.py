@@ -12,10 +12,11 @@ from hovi.optimize.banded_model import BandModel
 from hovi.optimize.criteria import Criteria
 from hovi.optimize.ended import STOPS, Reason, why_stopped
 from hovi.optimize.observed import between_steps
+from hovi.optimize.quadratic_program import sparse_sum
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.answer import Answer
-from hovi.planning.solver.methods.method import Guess, Method, Report
+from hovi.planning.solver.methods.method import Guess, ProblemMethod, Report
 from hovi.planning.solver.outcome.cost_with_time import cost_of
 from hovi.planning.solver.status import Status, chart_sentence, unfinished
 from hovi.system.deadline import Deadline
@@ -38,7 +39,7 @@ METRIC_FLOOR = 1e-12
 """Added to the metric, relative to its largest entry: where both ends are free it is singular."""
 
 
-class Stationary(Method):
+class Stationary(ProblemMethod):
     """Newton's method with a line search on the norm of the gradient.
 
     It ends in a stationary point of the action of any index, such as a motion of mechanics beyond
@@ -56,7 +57,7 @@ class Stationary(Method):
         criteria: Criteria,
         report: Report | None = None,
     ) -> Answer:
-        """See Method.minimize; what is made small is the gradient."""
+        """See ProblemMethod.minimize; what is made small is the gradient."""
         search = _Search(ActionObjective(problem, "band"), start.x)
         with Deadline(criteria.time_limit).in_force():
             why = search.run(criteria.max_iterations, report)
@@ -84,7 +85,7 @@ class _Search:
         self.objective, self.x, self.steps = objective, x, 0
         layout, metric = objective.structure.layout, objective.structure.metric["nodal"]
         n = objective.problem.ld.lagrangian.nv
-        D = _matrix(layout.unknowns, metric[..., None, None] * np.eye(n), layout.scales)
+        D = sparse_sum(layout, metric[..., None, None] * np.eye(n))
         floor = METRIC_FLOOR * max(abs(D).max(), 1e-300)
         self.metric = _factor(D, floor)
 
@@ -107,7 +108,7 @@ class _Search:
         model = self.objective.model(self.x, None, None)
         assert isinstance(model, BandModel)
         layout, gradient = model.layout, model.gradient
-        H = _matrix(layout.unknowns, model.intervals.hessian, layout.scales)
+        H = sparse_sum(layout, model.intervals.hessian)
         try:
             step = _factor(H).solve(-gradient)
         except RuntimeError:  # exactly singular
@@ -144,21 +145,3 @@ def _factor(matrix: csc_matrix, floor: float = 0.0) -> SuperLU:
     from scipy.sparse.linalg import splu
 
     return splu(csc_matrix(matrix + floor * identity(matrix.shape[0])) if floor else matrix)
-
-
-def _matrix(unknowns: npt.NDArray[np.intp], hessian: Array, scales: Array | None) -> csc_matrix:
-    """A sum over intervals as a sparse matrix of the unknowns.
-
-    unknowns: of the columns, (N, m, n), -1 where fixed. hessian: (N, m, m, n, n). scales: (N, m).
-    """
-    from scipy.sparse import csc_matrix  # as in _factor
-
-    N, m, n = unknowns.shape
-    blocks = hessian.transpose(0, 1, 3, 2, 4).reshape(N, m * n, m * n)
-    if scales is not None:
-        columns = np.repeat(scales, n, axis=1)
-        blocks = blocks * columns[:, :, None] * columns[:, None, :]
-    flat = unknowns.reshape(N, m * n)
-    i, j = np.broadcast_arrays(flat[:, :, None], flat[:, None, :])
-    free, size = (i >= 0) & (j >= 0), int(flat.max()) + 1
-    return csc_matrix((blocks[free], (i[free], j[free])), shape=(size, size))

@@ -14,13 +14,13 @@ from hovi.optimize.trust_region import minimize
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.answer import Answer
-from hovi.planning.solver.methods.method import Guess, Method, Report
+from hovi.planning.solver.methods.method import Guess, ProblemMethod, Report
 from hovi.planning.solver.outcome.cost_with_time import price_of_time
 from hovi.planning.solver.status import chart_sentence, status_of
 from hovi.system.deadline import OutOfTimeError
 
 
-class TrustRegion(Method):
+class TrustRegion(ProblemMethod):
     """Newton's method with exact Hessians in a trust region, down to rounding errors."""
 
     def supports(self, problem: TrajectoryProblem) -> bool:
@@ -34,7 +34,7 @@ class TrustRegion(Method):
         criteria: Criteria,
         report: Report | None = None,
     ) -> Answer:
-        """See Method.minimize."""
+        """See ProblemMethod.minimize."""
         objective = ActionObjective(problem)
         exact = dataclasses.replace(criteria, exact=True)
         ended = minimize(objective, Start(start.x), exact, report)

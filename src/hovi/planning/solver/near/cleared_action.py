@@ -11,8 +11,8 @@ import numpy.typing as npt
 from hovi.discrete.contraction import Expansion
 from hovi.discrete.grid import DiscretePath
 from hovi.optimize.barrier import Bounds
-from hovi.optimize.bounded_objective import Refinement
 from hovi.optimize.ended import Outputs
+from hovi.optimize.program import Refinement
 from hovi.optimize.quadratic_model import QuadraticModel
 from hovi.planning.clearance.clearance import DISTANCE_SCALE
 from hovi.planning.problem.limits import Limits
@@ -114,11 +114,11 @@ class ClearedAction(BoundedAction):
 
     @property
     def may_be_concave(self) -> bool:
-        """See BoundedObjective."""
+        """See Program."""
         return self.near.size > 0
 
     def model_without_concavity(self, x: DiscretePath) -> QuadraticModel | None:
-        """See BoundedObjective: with the positive part of the rows' curvature."""
+        """See Program: with the positive part of the rows' curvature."""
         near = self._near
         other = None if near is None else near.without_negative_curvature()
         if near is None or other is None:
@@ -164,11 +164,14 @@ class ClearedAction(BoundedAction):
         """See BoundedAction.forces: without those of rows."""
         return super().forces(x, self.plain(multipliers))
 
-    def refine(self, x: DiscretePath, level: float) -> Refinement | None:
+    def refine(
+        self, x: DiscretePath, level: float, forces: Array | None = None
+    ) -> Refinement | None:
         """Bound more control points, and distances where pairs come near: see ClearanceRows."""
         assert self.rows is not None
         order, before = self.near.order, self.rows.size
-        found = self.rows.refine(x, level)
+        known = None if forces is None else self.plain(forces)[self.row_outputs]
+        found = self.rows.refine(x, level, known)
         if found is not None:  # before anything that may run out of time
             self._limit_outputs = RecentPaths()
         sharper = self.near.sharpen(x)

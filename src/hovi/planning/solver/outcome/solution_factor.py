@@ -274,13 +274,8 @@ def _active(barrier: Barrier, density: float) -> tuple[npt.NDArray[np.bool_], fl
 
 def _rows_of(objective: BoundedAction, model: BandModel, outputs: Index) -> list[ConstraintRows]:
     """The slopes of some outputs in the columns of their intervals, those of as many together."""
-    N, m, n = model.intervals.gradient.shape
-    slopes = np.zeros((len(outputs), m, n))
-    for c in range(m):
-        for i in range(n):
-            one = np.zeros((N, m, n))
-            one[:, c, i] = 1.0
-            slopes[:, c, i] = objective.push_columns(one)[outputs]
+    N, m, n = shape = model.intervals.gradient.shape
+    slopes = objective.output_slopes(shape)[outputs]
     of = objective.output_intervals[outputs]
     counts, rows = np.bincount(of, minlength=N), []
     for count in np.unique(counts[counts > 0]):

@@ -1,4 +1,4 @@
-"""Objectives with bounds on outputs."""
+"""Programs: an objective with bounds on outputs and with equations, as methods see it."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import numpy.typing as npt
 from hovi.optimize.barrier import Bounds
 from hovi.optimize.ended import Outputs
 from hovi.optimize.quadratic_model import QuadraticModel
+from hovi.optimize.quadratic_program import QuadraticProgram
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]
@@ -28,8 +29,15 @@ class Refinement(NamedTuple):
     origin: Index
 
 
-class BoundedObjective(ABC, Generic[X]):
-    """An objective with bounded outputs."""
+class Program(ABC, Generic[X]):
+    """An objective f(x) with bounded outputs, lower <= y(x) <= upper, and equations c(x) = 0.
+
+    x: a point, such as a motion on a grid. A step s has the unknowns of a model as its entries, and
+        `retract` says where it leads.
+    bounds: of the R outputs, in units of their ranges, with their weights w in the Lagrangian
+        f + sum w z y + l.c. The multipliers l of equations are a part of the program: `outputs` and
+        models have the terms l.c, and `hold` changes l.
+    """
 
     bounds: Bounds
     blocked: bool = False
@@ -79,6 +87,16 @@ class BoundedObjective(ABC, Generic[X]):
     def retract(self, x: X, step: Array, model: QuadraticModel) -> X:
         """The point that a step of a model leads to."""
 
+    def quadratic(
+        self, x: X, forces: Array, sigma: Array | None = None, rho: Array | None = None
+    ) -> QuadraticProgram:
+        """The quadratic program at x, with the exact Hessian of the Lagrangian.
+
+        forces: z of the outputs, shape (R,), whose curvature the Hessian has. sigma, rho: of terms
+        as in `model` that are added to it, (R,); none if None.
+        """
+        raise NotImplementedError
+
     def hold(self, change: Array) -> None:
         """Add a change to the multipliers of equations, shape (E,)."""
 
@@ -93,11 +111,12 @@ class BoundedObjective(ABC, Generic[X]):
         """Whether equations hold at x to their tolerance; true without any."""
         return True
 
-    def refine(self, x: X, level: float) -> Refinement | None:
+    def refine(self, x: X, level: float, forces: Array | None = None) -> Refinement | None:
         """Replace outputs by others, which come after those that remain and bound x less.
 
         Returns None if nothing changed.
         level: mean product z gap at x, relative to the mean density of the objective.
+        forces: |z| of the outputs, relative to the same; None for the level over their gaps.
         """
         return None
 
