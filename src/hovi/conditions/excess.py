@@ -169,9 +169,15 @@ def _torque_cells(motion: Trajectory, given: Condition[TwoSided, Any]) -> Cells:
 
 def largest_excess(motion: Trajectory, given: Condition[TwoSided, Any]) -> Excess:
     """`excess_along`, and the position of each in its interval, (2, N, size)."""
-    return _with_narrow(
-        _excess_in(Cells.of(motion.grid.intervals, 1), motion, given), motion, given
+    cells, here = Cells.of(motion.grid.intervals, 1), given.holds_in(motion.grid)
+    if here.all() or not here.any():
+        return _with_narrow(_excess_in(cells, motion, given), motion, given)
+    sides, at = (
+        np.full((2, len(here), given.y.size), -NO_BOUND),
+        np.zeros((2, len(here), given.y.size)),
     )
+    sides[:, here], at[:, here] = _excess_in(cells.chosen(here), motion, given)
+    return _with_narrow((sides, at), motion, given)
 
 
 def _with_narrow(found: Excess, motion: Trajectory, given: Condition[TwoSided, Any]) -> Excess:
