@@ -173,6 +173,11 @@ def _once(
     """The plan of one cycle. began: when it did, by the clock."""
     given = options.aiming(scene), start, goal, duration, progress
     if not all(each.timed for each in options.via):
+        if options.objective == "time":
+            raise InputError(
+                'objective = "time" does not choose the times of via points: give a free duration '
+                "and a large time_weight instead."
+            )
         return _through(*given, options)
     if options.objective == "time":
         return least_duration(functools.partial(_settled, *given), duration, options)
@@ -191,13 +196,13 @@ def _through(
     from hovi.planning.search.via_times import with_best_times  # most have times
 
     def planned(
-        timed: PlanOptions, near: Trajectory | None, settled: State | FrameGoal | None
+        timed: PlanOptions, T: float, near: Trajectory | None, settled: State | FrameGoal | None
     ) -> Solution:
         timed = _in_time_left(timed, deadline)
         if near is None:
-            return _settled(scene, start, goal, duration, progress, timed)
+            return _settled(scene, start, goal, T, progress, timed)
         end = goal if settled is None else settled
-        return _planned(scene, start, end, duration, progress, timed, None, near)
+        return _planned(scene, start, end, T, progress, timed, None, near)
 
     deadline = Deadline(options.time_limit_seconds)
     return with_best_times(planned, options, scene.robot, (start, goal), duration, deadline)
