@@ -159,6 +159,9 @@ def _summary(
         unknown = solution.n_neg < 0
         rows.append(("n_neg", "not determined" if unknown else f"{solution.n_neg}"))
         rows.append(("nit", f"{solution.nit}"))
+    fixed_by = "" if solution.accuracy is None else solution.accuracy.fixed_by
+    if fixed_by and (verbose or task.keeps):
+        rows.append(("grid", f"last refined for {fixed_by}"))
     rows += [
         ("scheme", f"{scheme_text(task, grid)} on {_intervals(solution, task)}"),
         ("time", f"{solution.setup_seconds:.2f} s setup, {solution.solve_seconds:.2f} s solving"),
