@@ -78,6 +78,17 @@ def excess_of(motion: Trajectory, given: Condition[TwoSided, Any]) -> Array:
     return _with_narrow((sides, np.zeros_like(sides)), motion, given)[0]
 
 
+def nearest_to_bounds(motion: Trajectory, given: Condition[TwoSided, Any]) -> tuple[float, float]:
+    """The least distance of a condition from its bounds, as a fraction of the scale, and when.
+
+    Negative beyond a bound. The time in [s].
+    """
+    sides, at = largest_excess(motion, given)
+    side, k, entry = np.unravel_index(int(np.argmax(sides)), sides.shape)
+    time = motion.t[k] + at[side, k, entry] * motion.grid.steps[k]
+    return -float(sides[side, k, entry]), float(time)
+
+
 def worst(motion: Trajectory, given: Condition[TwoSided, Any]) -> tuple[float, str]:
     """The largest excess as a fraction of the scale, and the value, time and bound in words."""
     sides, at = largest_excess(motion, given)

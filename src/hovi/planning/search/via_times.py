@@ -83,9 +83,9 @@ def with_best_times(
     bounds = duration if isinstance(duration, tuple) else (duration, duration)
     price = _Price(options.time_weight, *bounds)
     options = options.with_changes(time_weight=0.0)  # each plan is one in a given duration
-    shares = _first_shares(robot, ends, via, options)
+    fractions = _first_fractions(robot, ends, via, options)
     for T in dict.fromkeys((price.first, price.upper)):  # limits bind at short durations
-        lengths = T * shares
+        lengths = T * fractions
         found = planned(_at(options, lengths), T, None, None)
         if found.success or found.status in STOPPED:
             break
@@ -162,7 +162,7 @@ def _at(options: PlanOptions, lengths: Array) -> PlanOptions:
     return options.with_changes(via=[dataclasses.replace(each, time=t) for each, t in pairs])
 
 
-def _first_shares(
+def _first_fractions(
     robot: Robot, ends: tuple[End, End], via: Sequence[Via], options: PlanOptions
 ) -> Array:
     """Fractions of time in proportion to the largest change of a joint, (n + 1,)."""
