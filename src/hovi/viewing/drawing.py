@@ -20,6 +20,7 @@ from hovi.errors import ModelError
 from hovi.robot.robot import Robot
 from hovi.system.dataclass import dataclass
 from hovi.viewing.animation import placements_at
+from hovi.viewing.carried_objects import CarriedObjects
 from hovi.viewing.highlights import Highlights
 from hovi.viewing.meshcat_page import Page
 from hovi.viewing.meshes.page_mesh import page_mesh
@@ -78,14 +79,15 @@ def drawn(
     others: Sequence[tuple[Trajectory, Robot]] = (),
 ) -> Drawn:
     """Draw the robot at the start of the motion, the paths of its tips, and others as ghosts."""
-    payloads = Payloads.of(trajectory)
-    visual = _shapes(robot)
+    payloads, carried = Payloads.of(trajectory), CarriedObjects.of(trajectory, robot)
+    visual = carried.added_to(_shapes(robot), robot)
     if highlights is not None:
-        visual = highlights.with_highlighted_copies(visual)
+        frames = [robot.model.getFrameId(name) for name in carried.parts]
+        visual = highlights.with_highlighted_copies(visual, frames)
     visual = with_obstacles(payloads.added_to(visual, robot), trajectory)
     viewer = meshcat.Visualizer(window=page)
     visualizer = _visualizer(robot, visual, viewer, "robot")
-    tracks = payloads.changes(visualizer)
+    tracks = payloads.changes(visualizer) | carried.changes(visualizer, robot)
     MovingObjects.of(trajectory).place(visualizer, 0.0)
     visualizer.display(trajectory.q[0])
     for node, (_, flags) in tracks.items():

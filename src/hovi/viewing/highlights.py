@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -68,11 +69,16 @@ class Highlights:
         index = int(np.searchsorted(self.times, t, side="right")) - 1
         return np.asarray(self.flags[max(index, 0)])
 
-    def with_highlighted_copies(self, visual: pin.GeometryModel) -> pin.GeometryModel:
-        """The drawn objects, with a yellow copy of each that is ever highlighted."""
+    def with_highlighted_copies(
+        self, visual: pin.GeometryModel, left_out: Collection[int] = ()
+    ) -> pin.GeometryModel:
+        """The drawn objects, with a yellow copy of each that is ever highlighted.
+
+        left_out: frames whose objects have none.
+        """
         both = visual.copy()
         for item in list(visual.geometryObjects):
-            if self.flags[:, item.parentJoint].any():
+            if self.flags[:, item.parentJoint].any() and item.parentFrame not in left_out:
                 yellow = item.copy()
                 yellow.name = item.name + _COPY_SUFFIX
                 yellow.meshColor, yellow.overrideMaterial = _HIGHLIGHT_COLOR, True

@@ -100,6 +100,13 @@ def imposed_clearance(trajectory: Trajectory) -> Clearance | None:
         return None
 
 
+def carried_parts(trajectory: Trajectory) -> list[tuple[str, float, float]]:
+    """The links of what is carried, from when and until when, in [s]; none where not recorded."""
+    clearance, T = imposed_clearance(trajectory), trajectory.duration
+    known = () if clearance is None else clearance.during
+    return sorted((name, a, min(b, T)) for name, a, b in known if 0.0 <= a < min(b, T))
+
+
 def kept_distances(trajectory: Trajectory) -> tuple[Clearance, Distances] | None:
     """The recorded clearance and its distances; None where not recorded or not computable."""
     clearance = imposed_clearance(trajectory)

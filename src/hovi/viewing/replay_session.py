@@ -9,9 +9,13 @@ import os
 import time
 import warnings
 import webbrowser
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import field
 from pathlib import Path
 from typing import TYPE_CHECKING, Self
+
+import numpy as np
+import numpy.typing as npt
 
 from hovi.checks.arguments import check_arguments_except
 from hovi.discrete.output.caution import caution_lines, warn_of_cautions
@@ -43,6 +47,9 @@ with warnings.catch_warnings():
     import meshcat.path
     from pinocchio.visualize import MeshcatVisualizer
 
+Array = npt.NDArray[np.float64]
+Mask = npt.NDArray[np.bool_]
+
 _FRAME_RATE = 60.0
 _BROWSER_TIMEOUT = 20.0  # [s]
 
@@ -58,6 +65,7 @@ class Replay:
     highlights: links highlighted at limits; None where no joint is ever at a limit.
     ghosts: the motions that are compared with it, and what draws them.
     speed: motion seconds per second, at first.
+    tracks: when what is not always shown is so, by node name: times in [s], and flags.
     """
 
     trajectory: Trajectory
@@ -67,6 +75,7 @@ class Replay:
     highlights: Highlights | None = None
     ghosts: tuple[tuple[Trajectory, MeshcatVisualizer], ...] = ()
     speed: float = 1.0
+    tracks: Mapping[str, tuple[Array, Mask]] = field(default_factory=dict)
 
     def play(self, *, speed: float = 1.0, loop: bool = False, rate: float = _FRAME_RATE) -> None:
         """Move the robot on the page in real time from here, by the monotonic clock.
@@ -113,8 +122,9 @@ class Replay:
     def _show(self, t: float, moving: MovingObjects) -> None:
         moving.place(self.visualizer, t)
         self.visualizer.display(self.trajectory.configurations(t)[0])
-        if self.highlights is not None:
-            self.highlights.show(self.visualizer, t)
+        for node, (times, flags) in self.tracks.items():
+            shown = flags[max(int(np.searchsorted(times, t, side="right")) - 1, 0)]
+            self.visualizer.viewer[node].set_property("visible", bool(shown))
         for trajectory, ghost in self.ghosts:
             ghost.display(trajectory.configurations(min(t, trajectory.duration))[0])
         if isinstance(self.page, Page):  # the slider and the curves follow
@@ -270,7 +280,8 @@ def _fill(
     page.panel = _panel(trajectory, robot, compare, scene.view, speed, trace)
     motions = ((trajectory, scene.visualizer), *scene.ghosts)
     page.keep(animation_of(motions, loop, scene.tracks))
-    return Replay(trajectory, scene.visualizer, page.web_url, page, highlights, scene.ghosts, speed)
+    known = page.web_url, page, highlights, scene.ghosts, speed, scene.tracks
+    return Replay(trajectory, scene.visualizer, *known)
 
 
 def _panel(
