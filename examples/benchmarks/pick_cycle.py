@@ -5,9 +5,9 @@ goes down to it on a straight line with its tool vertical, in the last 50 mm no 
 100 mm/s, lifts it 100 mm straight up, carries it, lowers it straight by 50 mm as slowly, and goes
 home. It rests at both ends of each, whose duration is free, at one price per second. The scan is a
 descent along each duration in turn, by plans for given ones, from the geometric means of their
-bounds on.
+bounds on, or from what was found.
 
-    python pick_cycle.py [--weight 200] [--finest 1.05]
+    python pick_cycle.py [--weight 200] [--finest 1.05] [--around]
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ BOUNDS = 0.2, 4.0
 HOME = (0.0, -1.2, 1.5, -1.87, -1.57, 0.0)
 PART, PLACE, HEIGHT = (0.45, 0.25), (0.45, -0.25), 0.15
 """x and y of both, and z of the tool there, in [m]."""
-FIRST_STEP, SHRINKS = 1.6, 0.5
-"""Factor on a duration in the first sweep of the scan, and on its logarithm where none is better.
-"""
+FIRST_STEP, AROUND_STEP, SHRINKS = 1.6, 1.1, 0.5
+"""Factors on a duration in the first sweep of the scan, from the means and from what was found, and
+on its logarithm where none is better."""
 Durations = Sequence[float | tuple[float, float]]
 
 
@@ -70,9 +70,9 @@ class Scan:
     best: float = np.inf
     plans: int = 0
 
-    def run(self, finest: float) -> None:
+    def run(self, first: float, finest: float) -> None:
         """Descend along each duration in turn, until no step by the finest factor is better."""
-        self.best, step = self._tried(self.durations), np.log(FIRST_STEP)
+        self.best, step = self._tried(self.durations), np.log(first)
         while step > np.log(finest) * SHRINKS:
             better = [self._along(i, step) for i in range(len(self.durations))]
             if not any(better):
@@ -101,6 +101,7 @@ def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("--weight", type=float, default=200.0, help="price of a second")
     parser.add_argument("--finest", type=float, default=1.05, help="factor of the last sweep")
+    parser.add_argument("--around", action="store_true", help="scan from the durations found")
     given = parser.parse_args()
     scene = hovi.Scene(hovi.load_robot("ur5"), [hovi.effects.Gravity()])
 
@@ -110,9 +111,12 @@ def main() -> None:
 
     free, price = cycle([BOUNDS] * len(NAMES)), given.weight
     seconds, found = timed(lambda: hovi.plan_sequence(scene, HOME, free, time_weight=price))
-    scan = Scan(total, [float(np.sqrt(np.prod(BOUNDS)))] * len(NAMES))
-    taken, _ = timed(lambda: scan.run(given.finest))
-    lengths = found.trajectory.segment_durations
+    lengths = found.trajectory.segment_durations.tolist()
+    first, begun = FIRST_STEP, [float(np.sqrt(np.prod(BOUNDS)))] * len(NAMES)
+    if given.around:
+        first, begun = AROUND_STEP, [float(np.clip(T, *BOUNDS)) for T in lengths]
+    scan = Scan(total, begun)
+    taken, _ = timed(lambda: scan.run(first, given.finest))
     rows = [
         ["found together", f"{found.cost:.6g}", _said(lengths), "1", f"{seconds:.3g}"],
         ["best of the scan", f"{scan.best:.6g}", _said(scan.durations), *_of(scan, taken)],
@@ -120,7 +124,7 @@ def main() -> None:
     columns = ["", "cost J + w T", "durations [s], in order", "plans", "CPU s"]
     print_table(columns, rows)
     more = 100 * (found.cost / scan.best - 1)
-    print(f"The durations found together cost {more:+.2g} % of the best of the scan.")
+    print(f"The durations found together cost {more:+.2g} % more than the best of the scan.")
     print(f"It is a {found.status}: {found.message}")
     print_machine(threads=1)
 
