@@ -54,13 +54,22 @@ class KeptTask:
     least: float
 
 
-def random_tasks(scene: hovi.Scene, kind: str, count: int, seed: int) -> list[KeptTask]:
-    """Tasks of one kind whose way is within limits."""
+def random_tasks(
+    scene: hovi.Scene,
+    kind: str,
+    count: int,
+    seed: int,
+    apart: Callable[[Array], bool] = lambda way: True,
+) -> list[KeptTask]:
+    """Tasks of one kind whose way is within limits.
+
+    apart: whether links are apart along a way, (WAYPOINTS, nq).
+    """
     rng, found = np.random.default_rng(seed), []
     for _ in range(MAX_TRIES):
         if len(found) == count:
             break
-        task = _random_task(scene, scene.robot.tip_frames[0], kind, rng)
+        task = _random_task(scene, scene.robot.tip_frames[0], kind, rng, apart)
         if task is not None:
             found.append(task)
     return found
@@ -74,7 +83,11 @@ def pose(model: pin.Model, frame: str, q: Array) -> Array:
 
 
 def _random_task(
-    scene: hovi.Scene, frame: str, kind: str, rng: np.random.Generator
+    scene: hovi.Scene,
+    frame: str,
+    kind: str,
+    rng: np.random.Generator,
+    apart: Callable[[Array], bool],
 ) -> KeptTask | None:
     robot, model = scene.robot, torque_model(scene)
     wide = robot.upper - robot.lower > 2 * np.pi
@@ -93,7 +106,7 @@ def _random_task(
         return None
     curve = CubicSpline(np.linspace(0.0, 1.0, len(way)), way)
     least = _least_time(model, robot, curve, frame, SPEED if "m/s" in kind else np.inf)
-    if least is None:
+    if least is None or not apart(way):
         return None
     duration = least * rng.uniform(RESERVE, SLOWER)
     return KeptTask(q, first[:3, 3] + aside, float(duration), least)

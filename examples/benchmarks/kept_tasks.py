@@ -1,9 +1,11 @@
 """Random tasks that keep a line, a plane, a direction or a speed, within the URDF's limits.
 
 Each has a way by inverse kinematics whose least time, with a fifth in reserve, is shorter than the
-duration (kept_paths.py). Motions are judged at 20,000 samples by Pinocchio alone: what is kept,
-limits on q, v and the torques of pin.rnea, and the integral of 1/2 |tau|^2. Steps and times of
-plans are also given relative to the plan of the same ends without what is kept.
+duration (kept_paths.py), and along which the given meshes of links are twice the margin apart:
+links are kept apart by default, as convex hulls. Motions are judged at 20,000 samples by Pinocchio
+alone: what is kept, limits on q, v and the torques of pin.rnea, and the integral of 1/2 |tau|^2;
+and, at fewer, the distances of the meshes by Coal. Steps and times of plans are also given relative
+to the plan of the same ends without what is kept.
 
     python kept_tasks.py [ARM ...] [--count 2] [--seed 0] [--kind WORD]
 """
@@ -15,11 +17,17 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
+import numpy.typing as npt
 from kept_paths import KINDS, ROOM, SPEED, KeptTask, pose, random_tasks
 from measuring import alone, print_machine, print_table
 from random_arms import arm_scene, largest_excess, middle_and_most, rnea, timed, torque_model
+from self_collision import ALLOWED, Meshes
 
 import hovi
+from hovi.planning.clearance.clearance import DEFAULT_MARGIN
+from hovi.planning.clearance.self_collisions import self_collision_pairs
+
+Array = npt.NDArray[np.float64]
 
 ARMS = ("ur5", "ur10", "panda", "kinova", "xarm7", "z1")
 SAMPLES = 20_000
@@ -54,13 +62,16 @@ class Run:
 
 def measure(arm: str, kind: str, count: int, seed: int, time_limit: float) -> list[Run]:
     """Every task of an arm, with what is kept and without."""
-    scene = arm_scene(arm)
+    scene = arm_scene(arm, shapes=True)
+    meshes = Meshes(scene.robot, self_collision_pairs(scene.robot))
     frame, keep = scene.robot.tip_frames[0], KINDS[kind](scene.robot.tip_frames[0])
     rows = []
-    for number, task in enumerate(random_tasks(scene, kind, count, seed)):
-        planned = partial(
-            hovi.plan, scene, task.start, duration=task.duration, self_collision=False
-        )
+
+    def apart(way: Array) -> bool:
+        return bool(meshes.distances(way).min() >= 2 * DEFAULT_MARGIN)
+
+    for number, task in enumerate(random_tasks(scene, kind, count, seed, apart)):
+        planned = partial(hovi.plan, scene, task.start, duration=task.duration)
         planned = partial(planned, processes=1, time_limit=time_limit)
         place = hovi.FrameGoal(frame, position=task.place)
         if number == 0:
@@ -70,7 +81,7 @@ def measure(arm: str, kind: str, count: int, seed: int, time_limit: float) -> li
         there = found.trajectory.q[-1]
         without, free = timed(partial(planned, there))
         points = found.accuracy.rounds[-1].points if found.accuracy is not None else 0
-        judged = judge(scene, kind, task, found)
+        judged = judge(scene, meshes, kind, task, found)
         both = found.success and free.success
         ratios = (found.nit / free.nit, seconds / without) if both else (np.nan, np.nan)
         rows.append(
@@ -91,7 +102,7 @@ def measure(arm: str, kind: str, count: int, seed: int, time_limit: float) -> li
 
 
 def judge(
-    scene: hovi.Scene, kind: str, task: KeptTask, found: hovi.Solution
+    scene: hovi.Scene, meshes: Meshes, kind: str, task: KeptTask, found: hovi.Solution
 ) -> tuple[float, float, float, str]:
     """What is missed, in [m] and [rad], the largest speed, and what is wrong with a success."""
     model, frame = torque_model(scene), scene.robot.tip_frames[0]
@@ -121,6 +132,8 @@ def judge(
         > MAX_EXCESS,
         "integral": abs(integral - found.cost) > INTEGRAL * found.cost,
         "goal": float(np.abs(p[-1] - task.place).max()) > 1e-6,
+        "distances of links": found.success
+        and meshes.least_along(found.trajectory) < DEFAULT_MARGIN - ALLOWED,
         "rest": float(max(np.abs(x.v[0]).max(), np.abs(x.v[-1]).max())) > 1e-8,
     }
     wrong = [name for name, bad in said.items() if bad] if found.success else []

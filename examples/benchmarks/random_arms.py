@@ -7,9 +7,11 @@ the solver is `cold_point_solve`.
 from __future__ import annotations
 
 import re
+import tempfile
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
@@ -45,19 +47,27 @@ class Reach:
     duration: float
 
 
-def arm_scene(name: str, armature: float = 0.0) -> hovi.Scene:
+def arm_scene(name: str, armature: float = 0.0, shapes: bool = False) -> hovi.Scene:
     """An arm under gravity with its fingers locked.
 
     Continuous joints become revolute joints with the limits of their <limit> tags: in the Kinova's
-    URDF these are +-2 pi. armature: rotor inertia of every joint, in [kg m^2].
+    URDF these are +-2 pi. armature: rotor inertia of every joint, in [kg m^2]. shapes: whether it
+    has its collision shapes.
     """
-    text = example_robot(name).urdf.read_text()
-    model = pin.buildModelFromXML(text.replace('type="continuous"', 'type="revolute"'))
+    known = example_robot(name)
+    text = known.urdf.read_text().replace('type="continuous"', 'type="revolute"')
+    model = pin.buildModelFromXML(text)
     locked = [each for each in list(model.names)[1:] if _FINGERS.fullmatch(each)]
     effects: list[Any] = [hovi.effects.Gravity()]
     if armature:
         effects.append(hovi.effects.Armature(armature))
-    return hovi.Scene(hovi.load_robot(model, locked=locked), effects)
+    if not shapes:
+        return hovi.Scene(hovi.load_robot(model, locked=locked), effects)
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / known.urdf.name
+        path.write_text(text)
+        given = {"package_dirs": [known.package_dir], "srdf": known.srdf, "locked": locked}
+        return hovi.Scene(hovi.load_robot(path, **given), effects)
 
 
 def random_reaches(scene: hovi.Scene, count: int, seed: int) -> list[Reach]:

@@ -18,6 +18,9 @@ import umsgpack
 
 import hovi
 from hovi.errors import InputError, SceneError
+from hovi.planning.clearance.clearance import Clearance
+from hovi.planning.sequence.branches import MoveToGoal, chosen_branches
+from hovi.planning.sequence.carried import scene_carrying
 from hovi.viewing.payloads import Payloads
 from hovi.viewing.recorded_limits import imposed_clearance, kept_distances
 from hovi.viewing.replay_session import page_of
@@ -331,3 +334,53 @@ def test_several_objects_and_a_payload_of_one_joint_act_together() -> None:
     sample = found.trajectory.sample(np.array([0.5]))
     known = held.model, held.model.createData(), sample.q[0], sample.v[0], sample.a[0]
     np.testing.assert_allclose(sample.tau[0], pin.rnea(*known), atol=1e-9)
+
+
+ROD = hovi.Grasped(
+    hovi.Box([0.5, 0.03, 0.03], [0.22, 0.0, 0.06]),
+    "tool0",
+    0.5,
+    "rod",
+    may_touch=["wrist_3_link", "ee_link"],
+)
+LONG = 0.6
+"""Height of a post, in [m]."""
+
+
+def rod_at(q: Array) -> pin.SE3:
+    """The middle of the rod, by Pinocchio alone."""
+    model = arm().robot.model
+    data = model.createData()
+    pin.framesForwardKinematics(model, data, q)
+    return data.oMf[model.getFrameId("tool0")] * pin.SE3(np.eye(3), np.array([0.22, 0.0, 0.06]))
+
+
+def test_inverse_kinematics_sees_what_is_carried_at_a_goal() -> None:
+    """Of the turns about the vertical that a goal leaves free, one puts the rod into a post."""
+    goal = hovi.FrameGoal("tool0", position=[0.45, 0.25, 0.35], axis=([0, 0, 1], [0, 0, -1]))
+    scene = scene_carrying(arm(), [hovi.Segment(goal, 1.0, grasped=[ROD])])
+    room = np.full(6, -2 * np.pi), np.full(6, 2 * np.pi)
+    begin = MoveToGoal((), 0.0, 0.0, hovi.State(at(0.6)), room)
+    end = MoveToGoal((1,), 1.0, 2.0, goal, room)
+
+    def chosen(middle: Array, during: tuple[str, float, float]) -> Array:
+        post = hovi.Cylinder(0.03, LONG, middle, name="post")
+        touching = [("rod", each) for each in ROD.may_touch]
+        clearance = Clearance([post], MARGIN, False, touching, during=[during])
+        known = scene.robot, scene.effort_lagrangian(), begin, [end], clearance
+        _, (reached,) = chosen_branches(*known)
+        assert isinstance(reached, hovi.FrameGoal)
+        return np.asarray(reached.guess)
+
+    def apart(q: Array, middle: Array) -> float:
+        place, result = rod_at(q), coal.DistanceResult()
+        here = coal.Transform3s(place.rotation, place.translation)
+        there = coal.Transform3s(np.eye(3), middle)
+        both = coal.Box(0.5, 0.03, 0.03), here, coal.Cylinder(0.03, LONG), there
+        coal.distance(*both, coal.DistanceRequest(), result)
+        return float(result.min_distance)
+
+    before, carried = ("rod", 0.0, 1.0), ("rod", 1.0, 2.0)
+    tip = rod_at(chosen(np.array([5.0, 5.0, 0.0]), before)) * np.array([0.2, 0.0, 0.0])
+    assert apart(chosen(tip, before), tip) < 0.0
+    assert apart(chosen(tip, carried), tip) >= MARGIN - 1e-6

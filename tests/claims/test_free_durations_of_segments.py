@@ -152,3 +152,15 @@ def test_durations_that_change_much_within_limits_are_stationary() -> None:
         near = T * np.array([fraction, 1.0, 1.0])
         again = planned(lasting(segments, near), {"limits": TORQUES}, guess=found.trajectory)
         assert not again.success or again.cost + 100.0 * near.sum() > found.cost * (1 - 1e-4)
+
+
+def test_the_motions_from_which_others_start_are_those_of_its_durations() -> None:
+    """Also where one is at a bound, so that the others are solved for again."""
+    asked, options = KINDS["at a bound"]
+    found = planned(asked(), options | {"time_weight": WEIGHT})
+    assert found.success, found.message
+    assert found.trajectory.segment_durations[1] == pytest.approx(2.5, rel=1e-9)
+    assert found.central is not None
+    h = found.trajectory.grid.steps[:, None]
+    for _, x in found.central.points:
+        np.testing.assert_allclose(x.q[1:] - x.q[:-1] - h * x.v[:-1], h**2 * x.z[:, 0], atol=1e-10)

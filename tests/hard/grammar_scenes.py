@@ -192,6 +192,7 @@ OPTIONS: dict[str, Any] = {
     "mimic": FLAG,
     "locked": _row(["elbow"], {"elbow": 0.1}, items="text", types="list table", open_=True),
     "time_weight": _leaf(0.1),
+    "repeat": _leaf(1, types="integer"),
 }
 
 

@@ -31,7 +31,8 @@ class KeptTrial:
 
     title: of the condition. success: whether a minimum was found; if not, the other numbers have no
     meaning. effort: of the motion. steps, seconds: of the plan. missed: by how much the motion
-    misses what is left out, in words.
+    misses what is left out, in words. fixed_by: what made the last refinement of its grid, "" for
+    none.
     """
 
     title: str
@@ -40,6 +41,7 @@ class KeptTrial:
     steps: int
     seconds: float
     missed: str
+    fixed_by: str = ""
 
 
 def kept_study(
@@ -88,7 +90,8 @@ def kept_rows(trials: list[KeptTrial]) -> list[list[str]]:
 
 def _trial(title: str, found: Solution, seconds: float, missed: str) -> KeptTrial:
     effort = np.nan if found.effort is None else float(found.effort)
-    return KeptTrial(title, found.success, effort, found.nit, seconds, missed)
+    fixed_by = "" if found.accuracy is None else found.accuracy.fixed_by
+    return KeptTrial(title, found.success, effort, found.nit, seconds, missed, fixed_by)
 
 
 def _planned(task: Task, limit: float | None) -> tuple[Solution, float]:

@@ -78,6 +78,17 @@ def excess_of(motion: Trajectory, given: Condition[TwoSided, Any]) -> Array:
     return _with_narrow((sides, np.zeros_like(sides)), motion, given)[0]
 
 
+def nearest_to_bounds(motion: Trajectory, given: Condition[TwoSided, Any]) -> tuple[float, float]:
+    """The least distance of a condition from its bounds, as a fraction of the scale, and when.
+
+    Negative beyond a bound. The time in [s].
+    """
+    sides, at = largest_excess(motion, given)
+    side, k, entry = np.unravel_index(int(np.argmax(sides)), sides.shape)
+    time = motion.t[k] + at[side, k, entry] * motion.grid.steps[k]
+    return -float(sides[side, k, entry]), float(time)
+
+
 def worst(motion: Trajectory, given: Condition[TwoSided, Any]) -> tuple[float, str]:
     """The largest excess as a fraction of the scale, and the value, time and bound in words."""
     sides, at = largest_excess(motion, given)
@@ -169,9 +180,15 @@ def _torque_cells(motion: Trajectory, given: Condition[TwoSided, Any]) -> Cells:
 
 def largest_excess(motion: Trajectory, given: Condition[TwoSided, Any]) -> Excess:
     """`excess_along`, and the position of each in its interval, (2, N, size)."""
-    return _with_narrow(
-        _excess_in(Cells.of(motion.grid.intervals, 1), motion, given), motion, given
+    cells, here = Cells.of(motion.grid.intervals, 1), given.holds_in(motion.grid)
+    if here.all() or not here.any():
+        return _with_narrow(_excess_in(cells, motion, given), motion, given)
+    sides, at = (
+        np.full((2, len(here), given.y.size), -NO_BOUND),
+        np.zeros((2, len(here), given.y.size)),
     )
+    sides[:, here], at[:, here] = _excess_in(cells.chosen(here), motion, given)
+    return _with_narrow((sides, at), motion, given)
 
 
 def _with_narrow(found: Excess, motion: Trajectory, given: Condition[TwoSided, Any]) -> Excess:

@@ -116,6 +116,8 @@ def _kept(scene: str) -> None:
         task = load_task(find_scene(scene))
         trials = kept_study(task, report)
     print_table(COLUMNS, kept_rows(trials), task.name, [0, 5])
+    if trials[0].fixed_by:
+        print(f"grid     of all of them last refined for {trials[0].fixed_by}")
 
 
 def _examine(robot: Robot, json: bool, model: pin.Model | None = None) -> NoReturn:

@@ -35,6 +35,9 @@ def plan(
     scheme: Annotated[str | None, typer.Option(help="Override the scene's.")] = None,
     intervals: Annotated[int | None, typer.Option(help="Override the scene's.")] = None,
     starts: Annotated[int | None, typer.Option(help="Number of initial guesses.")] = None,
+    repeat: Annotated[
+        int | None, typer.Option(help="How often the motion runs its cycle; override the scene's.")
+    ] = None,
     limits: Annotated[
         str | None,
         typer.Option(

@@ -31,6 +31,7 @@ def accuracy_json(solution: Solution, task: Task) -> dict[str, Any]:
             "error": grid_round.error,
             "nit": grid_round.nit,
             "seconds": grid_round.seconds,
+            "asked_by": grid_round.asked_by or None,
         }
         for grid_round in accuracy.rounds
     ]
@@ -38,6 +39,7 @@ def accuracy_json(solution: Solution, task: Task) -> dict[str, Any]:
         "tolerance": as_number_or_text(task.options.effective_tolerance),
         "tolerance_reached": accuracy.reached,
         "tolerance_reason": accuracy.reason or None,
+        "grid_fixed_by": accuracy.fixed_by or None,
         "errors": None if accuracy.estimate is None else errors_json(accuracy.estimate),
         "grids": rounds,
     }

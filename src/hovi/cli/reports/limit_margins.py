@@ -38,8 +38,8 @@ def nearest_pair(motion: Solution | Trajectory) -> tuple[float | None, str | Non
 class KnownMargins:
     """What a report shows of the margins of a motion, and whether the motion is usable.
 
-    limits, distance, segments, nearest_pair, conditions, missed: as hovi.Margins; None, or none,
-        where there are none.
+    limits, distance, segments, nearest_pair, conditions, missed, times, regions: as hovi.Margins;
+        None, or none, where there are none.
     violation: as Solution.violation; None if it is not known.
     missing: why the rest is not known; "" if all is.
     """
@@ -52,6 +52,8 @@ class KnownMargins:
     nearest_pair: str | None = None
     conditions: Mapping[str, float] = field(default_factory=dict)
     missed: Mapping[str, float] = field(default_factory=dict)
+    times: Mapping[str, float] = field(default_factory=dict)
+    regions: Mapping[str, float] = field(default_factory=dict)
 
     @classmethod
     def of(cls, solution: Solution, deadline: Deadline) -> KnownMargins:

@@ -18,6 +18,7 @@ from hovi.cli.reports.terminal_table import print_table
 from hovi.discrete.measures.motion_extremes import extremes
 from hovi.discrete.output.caution import STATUS, WARNED, cautions_of
 from hovi.errors import some_of
+from hovi.planning.problem.goal_region import ANGLE
 from hovi.planning.refinement.certificate import Certificate
 from hovi.planning.solver.outcome.limit_margins import LimitMargins
 from hovi.planning.solver.solver import Solution
@@ -67,6 +68,9 @@ def as_json(
         "least_distance": margins.distance,
         "nearest_pair": margins.nearest_pair,
         "conditions": dict(margins.conditions),
+        "missed": dict(margins.missed),
+        "condition_times": dict(margins.times),
+        "regions": dict(margins.regions),
         "out": None if out is None else str(out),
         **segments_json(solution, margins.segments),
         **accuracy_json(solution, task),
@@ -102,8 +106,7 @@ def print_report(
     _print_lines(extremes_lines(extremes(solution.trajectory), verbose))
     if margins.missing:
         print(f"margins  none: {margins.missing}")
-    for name, margin in margins.conditions.items():
-        print(f"{name:8} condition with a margin of {100 * margin:.3g} % of its scale")
+    _print_conditions(solution, margins)
     if margins.distance is not None:
         kept = task.options.clearance.margin
         print(
@@ -114,6 +117,21 @@ def print_report(
         _print_lines(certificate_lines(certificate, verbose))
     _print_lines(_cautions(solution))
     _print_file(out, solution)
+
+
+def _print_conditions(solution: Solution, margins: KnownMargins) -> None:
+    """Print what is known of each condition and region, and when it is so."""
+    asked = () if solution.problem is None else solution.problem.conditions
+    units = {each.name: each.unit and f" {each.unit}" for each in asked}
+    for name, margin in margins.conditions.items():
+        when = f" at t = {margins.times[name]:.4g} s"
+        print(f"{name:8} condition with a margin of {100 * margin:.3g} % of its scale{when}")
+    for name, size in margins.missed.items():
+        most = f"{size:.2g}{units.get(name, '')} at t = {margins.times[name]:.4g} s"
+        print(f"{name:8} condition that is missed by at most {most}")
+    for name, left in margins.regions.items():
+        unit = "rad" if name.split(" at ")[0].endswith(ANGLE) else "m"
+        print(f"region   {name}: {left:.3g} {unit} left of its room")
 
 
 def _cautions(solution: Solution) -> list[tuple[str, str]]:
@@ -159,6 +177,9 @@ def _summary(
         unknown = solution.n_neg < 0
         rows.append(("n_neg", "not determined" if unknown else f"{solution.n_neg}"))
         rows.append(("nit", f"{solution.nit}"))
+    fixed_by = "" if solution.accuracy is None else solution.accuracy.fixed_by
+    if fixed_by and (verbose or task.keeps):
+        rows.append(("grid", f"last refined for {fixed_by}"))
     rows += [
         ("scheme", f"{scheme_text(task, grid)} on {_intervals(solution, task)}"),
         ("time", f"{solution.setup_seconds:.2f} s setup, {solution.solve_seconds:.2f} s solving"),

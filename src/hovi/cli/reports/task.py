@@ -30,6 +30,8 @@ def describe_task(task: Task) -> str:
     lines.append(
         f"starts {options.starts}, seed {options.seed}, limits {_limits(task.options.limits)}"
     )
+    if options.repeat > 1:
+        lines.append(f"repeat {options.repeat}: the motion runs this cycle {options.repeat} times")
     if options.objective != "effort":
         lines.append(describe_objective(task.scene, options.objective))
     if options.smooth:

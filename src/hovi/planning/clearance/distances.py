@@ -150,12 +150,20 @@ class Distances:
         chosen.parts = (None,) * len(self.pairs)
         return chosen
 
-    def still(self) -> Distances:
-        """The distances of pairs that do not depend on time, for configurations without times."""
+    def still(self, time: float | None = None) -> Distances:
+        """The distances of pairs that do not depend on time, for configurations without times.
+
+        time: in [s], at which pairs that are bounded in parts are among them; None for none of
+        these.
+        """
         moving = self.moving.keys()
         ends = zip(self.ends, self.parts, strict=True)
-        kept = [k for k, (pair, part) in enumerate(ends) if part is None and not moving & set(pair)]
-        chosen = self.restricted(kept)
+        kept = [
+            k
+            for k, (pair, part) in enumerate(ends)
+            if _holds(part, time) and not moving & set(pair)
+        ]
+        chosen = self.restricted(kept).always()
         chosen.paths = ()
         return chosen
 
@@ -248,6 +256,13 @@ class Distances:
         if self.allowance.any():
             distances = distances + self.allowance
         return distances, jacobian, curvature
+
+
+def _holds(part: Parts | None, time: float | None) -> bool:
+    """Whether a pair is bounded at a time, in [s]; None for at all times."""
+    if part is None or time is None:
+        return part is None
+    return any(begin - SAME_TIME <= time <= end + SAME_TIME for begin, end in part)
 
 
 def _parts(pair: Pair, clearance: Clearance) -> Parts | None:

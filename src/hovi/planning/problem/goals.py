@@ -43,7 +43,7 @@ class Via:
     """A via point: a goal that the motion reaches at a given time.
 
     time: in [s]; a text such as "500 ms" is converted. "free" for the time at which passing it
-        costs least, of motions of a given duration; infinite from then on.
+        costs least; infinite from then on.
     goal: a State, whose velocity is free if none is given, or its configuration alone; or a
         FrameGoal, or a list of them for several frames at once, which leaves all velocities free.
     Raises InputError for a time that is not positive, or another kind of goal.

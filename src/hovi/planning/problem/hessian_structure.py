@@ -150,6 +150,7 @@ def unknowns(
     free[[0, -1], :k] = False if free_ends is None else free_ends
     for each in holds:
         free[2 * each.node, :2] &= ~each.fixed
+        free[2 * each.node, 2:] &= each.higher is None
     free[1::2] = np.arange(max(k, r))[:, None] < modes[:, None, None]
     if periodic:
         free[-1] = False

@@ -107,10 +107,12 @@ def configurations(
     clearance: Clearance,
     most: int = MOST,
     seeds: int = SEEDS,
+    time: float | None = None,
 ) -> Array:
     """As `inverse_kinematics`: the configurations in which a frame reaches its goal, (K, nq).
 
-    near: shape (nq,). bounds: as position_bounds. Raises UnreachableError.
+    near: shape (nq,). bounds: as position_bounds. time: in [s], of what is carried then. Raises
+    UnreachableError.
     """
     searched = min(SEARCHED * most, MAX_COUNT) if clearance.wanted else most
     found = find_branches(robot, goal, near, bounds, searched, seeds)
@@ -118,7 +120,7 @@ def configurations(
         raise UnreachableError(_unreachable(robot, goal, found), found.best)
     q = by_distance(robot, found.q, near)
     if clearance.wanted:
-        q = _clear(q, distances_between(robot, clearance), clearance.margin)
+        q = _clear(q, distances_between(robot, clearance).still(time), clearance.margin)
     return q[:most]
 
 
@@ -187,11 +189,10 @@ def _kept_clearance(obstacles: tuple[Obstacle, ...], margin: float, both: bool) 
 
 
 def _clear(q: Array, distances: Distances, margin: float) -> Array:
-    """The configurations that keep the margin from all that stands still.
+    """The configurations that keep the margin. distances: of all that stands still.
 
     Raises UnreachableError if none does.
     """
-    distances = distances.still()
     if not distances.pairs:
         return q
     d = distances.values(q)

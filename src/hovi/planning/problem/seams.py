@@ -31,9 +31,11 @@ class Seam(Via):
     unknowns, as at the ends of a motion.
 
     unreachable: why there is no such motion, or "".
+    higher: (q'', ..., q^(k-1)) there, shape (k - 2, nv), where cycles meet; free if None.
     """
 
     unreachable: str = ""
+    higher: Array | None = None
     takes_turns: ClassVar[bool] = True
     takes_regions: ClassVar[bool] = True
 
@@ -46,6 +48,7 @@ class Hold:
     are no unknowns, those of q in the tangent space, shape (2, nv). goal: of the seam, or the state
     at which a frame reaches it. turns: full turns of the guess since the last seam, or the start,
     beyond the shortest way: see `State.turns_on`. start: q with all full turns made until then.
+    higher: further derivatives that are fixed, (k - 2, nv); none if None.
     """
 
     node: int
@@ -56,6 +59,7 @@ class Hold:
     goal: State
     turns: Array
     start: State
+    higher: Array | None = None
 
     def configuration(self, q: Array, on: Coordinates) -> Array:
         """q, (nq,), with what is fixed of it, to the last digit."""
@@ -108,7 +112,7 @@ class ViaPoints:
                 fixed, (q, v) = ~goal.free_on(coordinates, "via"), goal.on(coordinates, "via")
                 turns = turns_to(goal, last, coordinates, q0, q)
                 last, q0 = keeping_turns(last, coordinates, q0, q, turns), q
-                holds.append(Hold(node, each.time, q, v, fixed, goal, turns, last))
+                holds.append(Hold(node, each.time, q, v, fixed, goal, turns, last, each.higher))
             equations += [equation(each, node, float(grid.t[node])) for each in wanted]
             reason = reason or getattr(each, "unreachable", "") or reached.reason
         return cls(tuple(equations), tuple(holds), reason)
@@ -120,6 +124,8 @@ def holding(path: DiscretePath, grid: Grid, holds: Sequence[Hold], on: Coordinat
     for each in holds:
         q[each.node] = each.configuration(path.q[each.node], on)
         rates[each.node, 0] = np.where(each.fixed[1], each.v, rates[each.node, 0])
+        if each.higher is not None:
+            rates[each.node, 1:] = each.higher
     change = np.concatenate([on.difference(path.q, q)[:, None], rates - path.rates], axis=1)
     if not change.any():
         return path
@@ -147,6 +153,8 @@ def curve_through(
     rates = np.zeros((len(q), len(ends) - 1, coordinates.nv))
     rates[[0, -1]] = np.stack(ends[1:], axis=1)
     rates[1:-1, 0] = [each.v for each in holds]
+    for number, each in enumerate(holds, start=1):
+        rates[number, 1:] = 0.0 if each.higher is None else each.higher
     around = np.stack([*(each.turns for each in holds), turns])
     way = coordinates.difference(q[:-1], q[1:]) + 2 * np.pi * around
     slopes = way / np.diff(times)[:, None]

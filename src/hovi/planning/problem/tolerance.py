@@ -137,6 +137,13 @@ class Tolerance:
             return max(error.angle, error.slide)
         return error.largest_tip
 
+    @property
+    def subject(self) -> str:
+        """The quantity, in a sentence."""
+        if self.quantity is Quantity.FRAME:
+            return f"the position of {self.frame or names_in_words(self.tips) or 'the tip'}"
+        return f"the {self.quantity}"
+
     def in_words(self, size: float, at: str = "", cost: str = "the cost") -> str:
         """An error of this quantity, with its unit.
 
@@ -178,6 +185,7 @@ class Round:
     intervals: N. points: total number of quadrature points. cost: of the solution.
     error: estimate, in the tolerance's SI unit; NaN if there is none.
     nit: steps of the optimiser. seconds: wall time of the solve and the estimate.
+    asked_by: what asked for its grid, such as the cost or a condition; "" for the first one.
     """
 
     intervals: int
@@ -186,6 +194,7 @@ class Round:
     error: float
     nit: int
     seconds: float
+    asked_by: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -208,6 +217,11 @@ class Accuracy:
     compare: Callable[[], MotionError] | None = field(default=None, repr=False)
     along: float = np.nan
     timed: bool = False
+
+    @property
+    def fixed_by(self) -> str:
+        """What made the last refinement, such as the cost or a condition; "" if there was none."""
+        return next((each.asked_by for each in reversed(self.rounds) if each.asked_by), "")
 
     @property
     def grows(self) -> bool:

@@ -151,10 +151,12 @@ class Refinement:
         self.best = candidate
         return ""
 
-    def _evaluated(self, solution: Solution, previous_decrease: float | None = None) -> Candidate:
+    def _evaluated(
+        self, solution: Solution, asked_by: str = "", previous_decrease: float | None = None
+    ) -> Candidate:
         """A solution with its estimated error, recorded as a round.
 
-        previous_decrease: see FinerSolution.
+        asked_by: see Round. previous_decrease: see FinerSolution.
         """
         raise_if_interrupted()
         began = time.perf_counter()
@@ -164,7 +166,7 @@ class Refinement:
         points = sum(len(scheme.points) * len(index) for scheme, index in grid.groups)
         seconds = solution.solve_seconds + time.perf_counter() - began
         error, steps = candidate.error, solution.nit
-        done = Round(grid.intervals, points, solution.cost, error, steps, seconds)
+        done = Round(grid.intervals, points, solution.cost, error, steps, seconds, asked_by)
         self.rounds.append(done)
         if self.on_round is not None:
             self.on_round(done)
@@ -199,7 +201,7 @@ class Refinement:
         if finer is None:
             fine, known = problem.on(grid), candidate.solution
             along = _along(known.central, problem, fine)
-            return self._evaluated(self._solved(fine, known.trajectory, along))
+            return self._evaluated(self._solved(fine, known.trajectory, along), candidate.asks)
         if grid is finer.problem.grid:
             solution = finer.finish()
             fine = finer.problem
@@ -209,7 +211,7 @@ class Refinement:
         if solution is None:
             along = _along(finer.central, finer.problem, fine)
             solution = self._solved(fine, interpolated_to(finer, fine), along)
-        return self._evaluated(solution, previous)
+        return self._evaluated(solution, candidate.asks, previous)
 
     def _solved(
         self,

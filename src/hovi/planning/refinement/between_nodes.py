@@ -56,13 +56,29 @@ def passive_torque(problem: TrajectoryProblem, trajectory: Trajectory) -> Passiv
     return PassiveTorque(by_interval / largest, name, float(tau[:, worst].max()), largest)
 
 
-def missed_between_nodes(problem: TrajectoryProblem, trajectory: Trajectory) -> Array | None:
-    """What equations along a motion are missed by in each interval, relative to what is accepted.
+class MissedBetweenNodes(NamedTuple):
+    """What equations along a motion are missed by between its nodes, relative to what is accepted.
 
-    Shape (N,); None without any.
+    by_interval: the largest of each interval, shape (N,). worst: the one that is missed most.
     """
-    found = [each.by_interval for each in missed_along(problem.along, trajectory)]
+
+    by_interval: Array
+    worst: str
+
+
+def missed_between_nodes(
+    problem: TrajectoryProblem, trajectory: Trajectory
+) -> MissedBetweenNodes | None:
+    """What is missed of equations along a motion, and of passive torques; None without any."""
+    found = [
+        MissedBetweenNodes(each.by_interval, f"condition {each.given.name!r}")
+        for each in missed_along(problem.along, trajectory)
+    ]
     passive = passive_torque(problem, trajectory)
     if passive is not None:
-        found.append(passive.by_interval / NEGLIGIBLE_FRACTION)
-    return np.max(found, axis=0) if found else None
+        relative = passive.by_interval / NEGLIGIBLE_FRACTION
+        found.append(MissedBetweenNodes(relative, f"the torque of {passive.joint!r}"))
+    if not found:
+        return None
+    worst = max(found, key=lambda each: float(each.by_interval.max()))
+    return MissedBetweenNodes(np.max([each.by_interval for each in found], axis=0), worst.worst)

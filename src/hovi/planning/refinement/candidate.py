@@ -12,7 +12,7 @@ from hovi.discrete.curve_integral import integral_along
 from hovi.discrete.measures.motion_error import relative_difference
 from hovi.errors import InputError
 from hovi.planning.problem.tolerance import CURVE_TOLERANCE, Quantity, Tolerance
-from hovi.planning.refinement.between_nodes import missed_between_nodes
+from hovi.planning.refinement.between_nodes import MissedBetweenNodes, missed_between_nodes
 from hovi.planning.refinement.error_estimate import (
     FinerSolution,
     estimate_against,
@@ -55,7 +55,7 @@ class Candidate:
         NaN if unknown.
     along: relative error of the integral of L~ along the curve; 0 for schemes without a curve.
     narrow: whether effects may change in a short time, so that the tolerance holds along the curve.
-    missed: what equations are missed by between the nodes; None as for `missed_between_nodes`.
+    missed: what equations are missed by between the nodes; None without any.
     uncancelled: the error with the sum of |contributions| instead of their sum, and at least the
         error inferred from the Hamiltonian.
     contradicted: relative difference from the cost on the next grid if it is far larger than the
@@ -70,7 +70,7 @@ class Candidate:
     error: float = np.nan
     uncancelled: float = np.nan
     along: float = np.nan
-    missed: Array | None = None
+    missed: MissedBetweenNodes | None = None
     contradicted: float = 0.0
     later: float = 0.0
     narrow: bool = False
@@ -128,7 +128,20 @@ class Candidate:
     @property
     def largest_missed(self) -> float:
         """The largest of `missed`; 0 without equations along the motion."""
-        return 0.0 if self.missed is None else float(self.missed.max())
+        return 0.0 if self.missed is None else float(self.missed.by_interval.max())
+
+    @property
+    def asks(self) -> str:
+        """What asks for a finer grid, in words; "" if nothing does."""
+        if self.finer is None:
+            return "a motion on a finer grid, of which none was found"
+        accepted = _accepted(self.error, self.uncancelled, self.tolerance)
+        asking = {
+            self.tolerance.subject: not accepted,
+            "the integral along the curve": self.along > self._largest_along,
+            "" if self.missed is None else self.missed.worst: self.largest_missed > 1.0,
+        }
+        return " and ".join(what for what, asked in asking.items() if asked)
 
     @property
     def difference(self) -> float:

@@ -183,6 +183,8 @@ def momentum_jump(problem: TrajectoryProblem, trajectory: Trajectory) -> float:
     ends = np.roll(D, 1, axis=0)[:, k:] + D[:, :k]  # that of the first node is of a cycle
     for each in problem.holds:
         ends[each.node, :2][each.fixed] = 0.0
+        if each.higher is not None:
+            ends[each.node, 2:] = 0.0
     jump = np.abs(ends[0 if problem.periodic else 1 :]).max(axis=(0, 2), initial=0.0)
     sizes = np.abs(D).reshape(len(D), 2, k, -1).max(axis=(0, 1, 3))
     return float(np.max(jump / np.maximum(sizes, np.finfo(float).tiny)))

@@ -82,7 +82,7 @@ def _demands_of_equations(candidate: Candidate) -> list[Demand]:
     """The reduction of what equations are missed by that each interval needs."""
     if candidate.missed is None:
         return []
-    return [Demand(TARGET_FRACTION / np.maximum(candidate.missed, 1e-300), 1)]
+    return [Demand(TARGET_FRACTION / np.maximum(candidate.missed.by_interval, 1e-300), 1)]
 
 
 def _demands_on_curve(candidate: Candidate, finer: FinerSolution, known: Array) -> list[Demand]:

@@ -133,7 +133,7 @@ class FinalStages:
         from hovi.planning.search.free_to_tolerance import MAX_GRIDS
 
         job, steps, tolerance = self.fine, 0, self.fine.tolerance
-        best = found
+        best, rounds = found, _rounds(found)
         for _ in range(MAX_GRIDS):
             best = dataclasses.replace(best, problem=on_grid_of(job.problem(), best))
             job, best, edges = best_segments(free, job, best, self._solver_of, self._solve_jointly)
@@ -142,15 +142,16 @@ class FinalStages:
                 break
             refined = dataclasses.replace(self, fine=job).refined(tolerance, "", best)
             settled = refined.trajectory.grid is best.trajectory.grid
-            best = refined
+            best, rounds = refined, (*rounds, *_rounds(refined))
             if settled or not refined.success:
                 break
         said = best.message
         if best.success and tolerance is None:
             said = f"a minimum of cost {best.cost:.10g} after {steps} steps."
-        return dataclasses.replace(
-            best, nit=steps, message=f"{said} {lengths_in_words(job)}{edges}"
-        )
+        message, accuracy = f"{said} {lengths_in_words(job)}{edges}", best.accuracy
+        if accuracy is not None:
+            accuracy = dataclasses.replace(accuracy, rounds=rounds)
+        return dataclasses.replace(best, nit=steps, message=message, accuracy=accuracy)
 
     def _solver_of(self, job: Job, clock: Clock) -> OnGrid:
         return partial(dataclasses.replace(self, fine=job)._lasting, clock)
@@ -279,6 +280,11 @@ class FinalStages:
     def _solve(self, job: Job, guess: Trajectory | Start[DiscretePath, None]) -> Solution:
         left, most = self.deadline.seconds_left, job.options.max_iterations
         return solved_on_grid(job.problem(), guess, max_iterations=most, time_limit=left)
+
+
+def _rounds(found: Solution) -> tuple[Round, ...]:
+    """The grids on which a solution was refined."""
+    return () if found.accuracy is None else found.accuracy.rounds
 
 
 def ended_early(best: Solution, status: Status, why: str) -> Solution:

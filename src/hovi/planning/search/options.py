@@ -56,8 +56,21 @@ INTERVALS_TWICE = "`intervals` and `scheme.intervals` are the same: leave one of
 """The message where the number of intervals is given twice."""
 MAX_INTERVALS = 1_000_000
 """Maximum number of intervals that may be requested."""
+MAX_CYCLES = 1_000
+"""Largest number of repetitions of a cycle."""
 _CHECKED_HERE = (
-    *("via", "conditions", "keep", "scheme", "intervals", "starts", "seed", "obstacles", "grasped"),
+    *(
+        "repeat",
+        "via",
+        "conditions",
+        "keep",
+        "scheme",
+        "intervals",
+        "starts",
+        "seed",
+        "obstacles",
+        "grasped",
+    ),
     *("margin", "max_iterations", "time_limit", "processes"),
 )
 """Options whose own checks say more than their annotations."""
@@ -88,6 +101,14 @@ class PlanOptions:
         "cost per [s] of a free duration.",
         SceneKey("a number, 0 or more: the cost per second"),
         least=0,
+    )
+    repeat: int = whole_number(
+        1,
+        "how often the motion runs its cycle, which is planned once and ends in the state in which "
+        "it starts; times are those of one cycle, and the cost is that of all.",
+        least=1,
+        most=MAX_CYCLES,
+        key=SceneKey("a whole number, 1 or more"),
     )
     via: Sequence[Via] = option(
         (), "goals that the motion reaches at given times: Via, or tables as in a scene file."

@@ -152,13 +152,37 @@ def plan(
         scene, start_end, goal_end = in_group(scene, options.group, *given)
         given = start_end, goal_end
     length = as_duration(duration)
-    planned = functools.partial(_settled, options.aiming(scene), *given, length, progress)
     with watched(on_iterate, cancel):
-        if not all(each.timed for each in options.via):
-            return _through(options.aiming(scene), *given, length, progress, options)
+        if options.repeat == 1:
+            return _once(scene, *given, length, progress, options, began)
+        from hovi.planning.search.repetition import goal_of_cycle, repeated  # most run once
+
+        given = given[0], goal_of_cycle(*given, scene.robot)
+        cycle = _once(scene, *given, length, progress, options, began)
+        return repeated(cycle, options.repeat)
+
+
+def _once(
+    scene: Scene,
+    start: State | FrameGoal,
+    goal: State | FrameGoal,
+    duration: float | tuple[float, float],
+    progress: Progress | None,
+    options: PlanOptions,
+    began: float,
+) -> Solution:
+    """The plan of one cycle. began: when it did, by the clock."""
+    given = options.aiming(scene), start, goal, duration, progress
+    if not all(each.timed for each in options.via):
         if options.objective == "time":
-            return least_duration(planned, length, options)
-        return planned(options, began)
+            raise InputError(
+                'objective = "time" does not choose the times of via points: give a free duration '
+                "and a large time_weight instead."
+            )
+        return _through(*given, options)
+    if options.objective == "time":
+        return least_duration(functools.partial(_settled, *given), duration, options)
+    return _settled(*given, options, began)
 
 
 def _through(
@@ -173,13 +197,13 @@ def _through(
     from hovi.planning.search.via_times import with_best_times  # most have times
 
     def planned(
-        timed: PlanOptions, near: Trajectory | None, settled: State | FrameGoal | None
+        timed: PlanOptions, T: float, near: Trajectory | None, settled: State | FrameGoal | None
     ) -> Solution:
         timed = _in_time_left(timed, deadline)
         if near is None:
-            return _settled(scene, start, goal, duration, progress, timed)
+            return _settled(scene, start, goal, T, progress, timed)
         end = goal if settled is None else settled
-        return _planned(scene, start, end, duration, progress, timed, None, near)
+        return _planned(scene, start, end, T, progress, timed, None, near)
 
     deadline = Deadline(options.time_limit_seconds)
     return with_best_times(planned, options, scene.robot, (start, goal), duration, deadline)
@@ -247,6 +271,10 @@ def _planned(
     planning = _Planning(scene, *given, T, chosen, free)
     job = planning.job(nearest_ends(scene, *given, chosen), deadline)
     problem = longest = job.problem()  # raises for invalid input before the search
+    if options.repeat > 1:
+        from hovi.planning.search.repetition import require_alike
+
+        require_alike(problem)
     if free is not None:
         job.lasting(free.clock, free.lower)  # raises for steps that are too short or too long
         longest = job.lasting(free.clock, free.upper).problem()

@@ -1,20 +1,21 @@
 """Via points without times: they are passed when that costs least.
 
-The lengths of time between the start, the via points and the goal are L_i = T p_i, with the
-softmax p of parameters y, so that they are positive and T is kept. With g_i = dJ/dL_i of a minimum
-for given times, which its momenta and multipliers give exactly,
+The lengths of time between the start, the via points and the goal are L_i = exp(y_i), so that they
+are positive. With g_i = dJ/dL_i + w of a minimum for given times, which its momenta and multipliers
+give exactly, and the price w of time,
 
-    dJ/dy_k = T p_k (g_k - sum_i p_i g_i),
+    d(J + w T)/dy_k = L_k (g_k - sum_i p_i g_i), p = L / T,
 
-by which a quasi-Newton method finds the y of least cost: each step is a solve on the same grid,
-stretched, from the motion before.
+where T is given, or at the bound of a free duration beyond which J + w T decreases, and L_k g_k
+elsewhere: there L is scaled to T. By this slope a quasi-Newton method finds the y of least cost:
+each step is a solve on the same grid, stretched, from the motion before.
 """
 
 from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Sequence
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -24,7 +25,7 @@ from hovi.discrete.state import State
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError
 from hovi.optimize.start import Start
-from hovi.planning.problem.clock import Clock
+from hovi.planning.problem.clock import SAME_LENGTH, Clock
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.goals import Via
 from hovi.planning.problem.inverse_kinematics import (
@@ -32,6 +33,9 @@ from hovi.planning.problem.inverse_kinematics import (
     nearest_configuration,
     position_bounds,
 )
+from hovi.planning.refinement.error_estimate import with_metadata
+from hovi.planning.search.continuation import STOPPED
+from hovi.planning.search.free_duration import cost_in_parts
 from hovi.planning.search.options import PlanOptions
 from hovi.planning.solver.free_duration.timed_path import stretched_path
 from hovi.planning.solver.solver import Solution, solved_on_grid
@@ -52,8 +56,9 @@ ROUNDS = 3
 """Largest number of plans with times that were found on the grid of the last one."""
 LEAST_FRACTION = 0.05
 """Least first length of time, relative to the mean one."""
-Planned = Callable[[PlanOptions, Trajectory | None, End | None], Solution]
-"""A plan with options, from a motion if there is one, to a goal that an earlier plan settled."""
+Planned = Callable[[PlanOptions, float, Trajectory | None, End | None], Solution]
+"""A plan with options in a duration, in [s], from a motion if there is one, to a goal that an
+earlier plan settled."""
 
 
 def with_best_times(
@@ -61,29 +66,34 @@ def with_best_times(
     options: PlanOptions,
     robot: Robot,
     ends: tuple[End, End],
-    duration: object,
+    duration: float | tuple[float, float],
     deadline: Deadline,
 ) -> Solution:
     """The motion that passes via points without times when that costs least.
 
-    ends: the start and the goal. deadline: of all plans. Raises InputError for a free duration, and
-        where only some of the via points have times.
+    ends: the start and the goal. duration: in [s], or the bounds of a free one, which is found with
+        the times. deadline: of all plans.
+    Raises InputError where only some of the via points have times, and for a price of a given time.
     """
-    via = options.via
+    via, free = options.via, isinstance(duration, tuple)
     if any(each.timed for each in via):
         raise InputError('give all via points times, or all of them time = "free".')
-    if not isinstance(duration, float | int):
-        raise InputError(
-            "via points without times need a given duration: give it as one number, or make them "
-            "goals of segments with free durations, and velocities that are free."
-        )
-    lengths = _first_lengths(robot, ends, via, float(duration), options)
-    found = planned(_at(options, lengths), None, None)
+    if options.time_weight != 0 and not free:
+        raise InputError("time_weight needs a free duration: give a pair (lower, upper).")
+    bounds = duration if isinstance(duration, tuple) else (duration, duration)
+    price = _Price(options.time_weight, *bounds)
+    options = options.with_changes(time_weight=0.0)  # each plan is one in a given duration
+    fractions = _first_fractions(robot, ends, via, options)
+    for T in dict.fromkeys((price.first, price.upper)):  # limits bind at short durations
+        lengths = T * fractions
+        found = planned(_at(options, lengths), T, None, None)
+        if found.success or found.status in STOPPED:
+            break
     steps = found.nit
     for _ in range(ROUNDS):
         if not found.success:
             return found
-        times = _Times.of(found, lengths)
+        times = _Times.of(found, lengths, price)
         with deadline.in_force():
             best = times.settled(deadline)
         steps += best.steps
@@ -91,14 +101,58 @@ def with_best_times(
             break
         goal = None if found.problem is None else found.problem.goal
         settled = goal if isinstance(goal, FrameGoal) else None
-        again = planned(_at(options, best.lengths), best.found.trajectory, settled)
+        timed, T = _at(options, best.lengths), float(best.lengths.sum())
+        again = planned(timed, T, best.found.trajectory, settled)
         steps += again.nit
-        if not again.success or again.cost >= found.cost:
+        if not again.success or price.total(again) >= price.total(found):
             break
         found, lengths = again, best.lengths
+    found = price.added_to(dataclasses.replace(found, nit=steps)) if free else found
     said = " and ".join(f"{t:.4g} s" for t in np.cumsum(lengths)[:-1])
     message = f"{found.message} It passes its via points at {said}, when that costs least."
     return dataclasses.replace(found, nit=steps, message=message)
+
+
+@dataclass(frozen=True, eq=False)
+class _Price:
+    """w of J + w T, and the bounds of T in [s], which are equal for a given duration."""
+
+    weight: float
+    lower: float
+    upper: float
+
+    @property
+    def first(self) -> float:
+        """The first duration, in [s]."""
+        return float(np.sqrt(self.lower * self.upper))
+
+    def total(self, found: Solution) -> float:
+        """J + w T of a motion planned in a given duration."""
+        return found.cost + self.weight * found.trajectory.duration
+
+    def slope(self, g: Array, lengths: Array) -> Array:
+        """The slope of J + w T in y, (n + 1,). g: dJ/dL + w."""
+        T, mean = lengths.sum(), (lengths @ g) / lengths.sum()
+        shrinks = mean >= 0 and T / self.lower <= 1.0 + SAME_LENGTH
+        grows = mean <= 0 and T / self.upper >= 1.0 - SAME_LENGTH
+        return np.asarray(lengths * (g - mean if shrinks or grows else g))
+
+    def after(self, lengths: Array, step: Array) -> Array:
+        """Lengths after a step of y, with T between its bounds."""
+        moved = lengths * np.exp(step)
+        return np.asarray(moved * (np.clip(moved.sum(), self.lower, self.upper) / moved.sum()))
+
+    def added_to(self, found: Solution) -> Solution:
+        """A motion with the price of its time in its cost, its problem and its message."""
+        cost, T = self.total(found), found.trajectory.duration
+        changes: dict[str, Any] = {"cost": cost, "minima": (cost,) if found.success else ()}
+        if found.problem is not None:
+            changes["problem"] = dataclasses.replace(found.problem, time_weight=self.weight)
+        parts = cost_in_parts(cost, self.weight * T, found.nit)
+        accuracy = "." if found.accuracy is None else f"; {found.accuracy}"
+        message = f"a minimum of cost {parts}{accuracy} The best duration is {T:.6g} s."
+        motion = with_metadata(found.trajectory, cost=cost)
+        return dataclasses.replace(found, message=message, trajectory=motion, **changes)
 
 
 def _at(options: PlanOptions, lengths: Array) -> PlanOptions:
@@ -108,10 +162,10 @@ def _at(options: PlanOptions, lengths: Array) -> PlanOptions:
     return options.with_changes(via=[dataclasses.replace(each, time=t) for each, t in pairs])
 
 
-def _first_lengths(
-    robot: Robot, ends: tuple[End, End], via: Sequence[Via], T: float, options: PlanOptions
+def _first_fractions(
+    robot: Robot, ends: tuple[End, End], via: Sequence[Via], options: PlanOptions
 ) -> Array:
-    """Lengths of time in proportion to the largest change of a joint, (n + 1,), in [s]."""
+    """Fractions of time in proportion to the largest change of a joint, (n + 1,)."""
     start, goal = ends
     bounds = position_bounds(robot, options.limits)
     near = None if isinstance(start, State) else first_configuration(robot, start, None, bounds)
@@ -126,28 +180,29 @@ def _first_lengths(
         ways.append(float(np.abs(robot.difference(q, there)).max()))
         q = there
     fractions = np.maximum(ways, LEAST_FRACTION * max(np.mean(ways), np.finfo(float).tiny))
-    return np.asarray(T * fractions / fractions.sum())
+    return np.asarray(fractions / fractions.sum())
 
 
 @dataclass(frozen=True, eq=False)
 class _Times:
     """A minimum for lengths of time between its via points, with the slopes in their parameters.
 
-    slope: dJ/dy, (n + 1,). inverse: an estimate of the inverse of d2J/dy2. steps: so far.
+    slope: of J + w T in y, (n + 1,). inverse: an estimate of that of its Hessian. steps: so far.
     """
 
     found: Solution
     lengths: Array
+    price: _Price
     slope: Array
     inverse: Array
     steps: int = 0
 
     @classmethod
-    def of(cls, found: Solution, lengths: Array) -> Self:
+    def of(cls, found: Solution, lengths: Array, price: _Price) -> Self:
         """From a minimum alone."""
-        slope = _slope(found, lengths)
+        slope = _slope(found, lengths, price)
         inverse = np.eye(len(slope)) * FIRST_STEP / max(float(np.abs(slope).max()), 1e-300)
-        return cls(found, lengths, slope, inverse)
+        return cls(found, lengths, price, slope, inverse)
 
     def same_as(self, other: _Times) -> bool:
         """Whether its times are those of another."""
@@ -160,7 +215,7 @@ class _Times:
             if deadline.passed:
                 break
             step = -now.inverse @ now.slope
-            if -0.5 * float(step @ now.slope) <= SETTLED * abs(now.found.cost):
+            if -0.5 * float(step @ now.slope) <= SETTLED * abs(now.price.total(now.found)):
                 return now
             step *= min(1.0, LARGEST_STEP / float(np.abs(step).max()))
             after = next(
@@ -173,17 +228,18 @@ class _Times:
 
     def _after(self, step: Array) -> _Times | None:
         """After a change of the parameters; None where the cost does not fall."""
-        weights = self.lengths * np.exp(step)
-        lengths = weights * (self.lengths.sum() / weights.sum())
+        lengths = self.price.after(self.lengths, step)
         try:
             found = _solved(self.found, self.lengths, lengths)
         except OutOfTimeError:
             return None
-        if not (found.success and found.cost < self.found.cost):
+        lower = self.price.total(found) < self.price.total(self.found)
+        if not (found.success and lower):
             return None
-        slope = _slope(found, lengths)
-        inverse = _updated(self.inverse, step - step.mean(), slope - self.slope)
-        return _Times(found, lengths, slope, inverse, self.steps + found.nit)
+        slope = _slope(found, lengths, self.price)
+        made = np.log(lengths / self.lengths)
+        inverse = _updated(self.inverse, made, slope - self.slope)
+        return _Times(found, lengths, self.price, slope, inverse, self.steps + found.nit)
 
 
 def _solved(found: Solution, now: Array, lengths: Array) -> Solution:
@@ -195,15 +251,15 @@ def _solved(found: Solution, now: Array, lengths: Array) -> Solution:
     return solved_on_grid(other, Start(path, near=True))
 
 
-def _slope(found: Solution, lengths: Array) -> Array:
-    """dJ/dy: see the module."""
+def _slope(found: Solution, lengths: Array, price: _Price) -> Array:
+    """That of J + w T in y: see the module."""
     ends = np.cumsum([0.0, *lengths])
 
     def rates(i: int) -> Callable[[Grid], Array]:
         return lambda grid: np.asarray(np.clip((grid.t - ends[i]) / lengths[i], 0.0, 1.0))
 
     g = np.array([found.derivative_in_time(rates(i)) for i in range(len(lengths))])
-    return np.asarray(lengths * (g - (lengths @ g) / lengths.sum()))
+    return price.slope(g + price.weight, lengths)
 
 
 def _updated(inverse: Array, step: Array, change: Array) -> Array:

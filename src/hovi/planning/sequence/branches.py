@@ -118,5 +118,5 @@ def _branches(robot: Robot, move: MoveToGoal, near: Array | None, clearance: Cle
     if isinstance(end, State):
         return end.on(robot, "goal")[0][None]
     first = first_configuration(robot, end, near if end.guess is None else None, move.bounds)
-    found = configurations(robot, end, first, move.bounds, clearance)
+    found = configurations(robot, end, first, move.bounds, clearance, time=move.end)
     return found[: 1 if end.guess is not None else COMPARED]

@@ -152,6 +152,10 @@ def _of_segments(
     if any(each.grasped for each in checked):
         scene, checked, chosen = _carrying(scene, checked, chosen)
     scene, begin, goals = _in_group(scene, start, checked, chosen)
+    if chosen.repeat > 1:
+        from hovi.planning.search.repetition import goal_of_cycle  # most sequences run once
+
+        goals = (*goals[:-1], goal_of_cycle(begin, goals[-1], scene.robot))
     scene = chosen.aiming(scene)
     deadline = Deadline(chosen.time_limit_seconds)
     names = (f"the goal of {name!r}" for name in names_of(checked))
@@ -172,7 +176,12 @@ def _of_segments(
     if any(isinstance(goal, FrameGoal) and goal.regional for goal in goals):
         found = _settled(found, scene, goals, checked, chosen, deadline, progress or silent, free)
     scenes = [each.acting.on(job.scene) for each in job.segments]
-    return _named(with_notes(found, scenes, job.options, apart), checked)
+    cycle = _named(with_notes(found, scenes, job.options, apart), checked)
+    if chosen.repeat == 1:
+        return cycle
+    from hovi.planning.search.repetition import repeated
+
+    return repeated(cycle, chosen.repeat)
 
 
 def _settled(
@@ -213,7 +222,11 @@ def _planned(
 ) -> tuple[Solution, Job]:
     """The motion in several segments from given durations on, and its job."""
     job = job_of(scene, start, goals, with_durations(segments, durations), options)
-    job.problem()  # raises for invalid input before the search
+    problem = job.problem()  # raises for invalid input before the search
+    if options.repeat > 1:
+        from hovi.planning.search.repetition import require_alike
+
+        require_alike(problem)
     warn_of_ends(scene.robot, job.start, job.goal, job.options)
     without = job.with_options(self_collision=False) if options.self_collision else None
     if fault := job.fault_of_time:

@@ -91,8 +91,9 @@ class Answer:
                 metadata["limits"] = problem.limits.to_dict()
         if problem.conditions:
             metadata["conditions"] = [each.name for each in problem.conditions]
-        if problem.clearance is not None and problem.clearance.wanted:
-            metadata["clearance"] = problem.clearance.to_dict()
+        clearance = problem.clearance
+        if clearance is not None and (clearance.wanted or clearance.during):
+            metadata["clearance"] = clearance.to_dict()
         ld = at_instants(problem, self.instants).ld
         momenta = accumulated_momenta(ld.derivatives(self.path, self.forces, self.jets))
         motion = problem.motion(self.path, momenta, metadata)

@@ -10,7 +10,7 @@ is not held may not be exceeded.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Protocol
 
 import numpy as np
@@ -134,8 +134,31 @@ def region_prices(solution: Solved) -> dict[str, float]:
             for bound, side in zip(part.bounds, _sides(part), strict=True):
                 m = multipliers[id(part)][bound.first]
                 size = float(np.linalg.norm(m)) if side is Side.MIDDLE else abs(float(m.sum()))
-                found[f"{part.frame} {bound.name}"] = 0.0 if side is Side.INSIDE else -size
+                time = solution.trajectory.t[end.node]
+                name = _name(found, part, bound, time)
+                found[name] = 0.0 if side is Side.INSIDE else -size
     return found
+
+
+def room_in_regions(problem: TrajectoryProblem, motion: Trajectory) -> dict[str, float]:
+    """What is left of the room of each bound where the frame ends, in [m] or [rad], by its name.
+
+    Negative outside.
+    """
+    found = dict[str, float]()
+    for end in _ends(problem):
+        q = motion.path.q[end.node]
+        for part in end.goal.parts:
+            for bound in part.bounds:
+                left = bound.room - abs(_value(part, bound, problem.robot, q))
+                found[_name(found, part, bound, motion.t[end.node])] = left
+    return found
+
+
+def _name(known: Mapping[str, float], goal: FrameGoal, bound: Bound, time: float) -> str:
+    """What a bound is called, with its time in [s] where another one is called so, too."""
+    name = f"{goal.frame} {bound.name}"
+    return name if name not in known else f"{name} at {time:.4g} s"
 
 
 def _sides(goal: FrameGoal) -> list[Side]:

@@ -111,6 +111,11 @@ class Task(Summarized):
             )
 
     @property
+    def keeps(self) -> bool:
+        """Whether the motion keeps something, in all of it or in a segment."""
+        return bool(self.options.keep) or any(each.keep for each in self.segments)
+
+    @property
     def held_scene(self) -> Scene:
         """The scene with what its robot holds, and with the shapes of what segments carry."""
         held = self.options.holding(self.scene)

@@ -99,7 +99,7 @@ class TimedSearch(BoundedSearch):
         self.back_to(found.x.lengths)
         self.last = self.problem, found.x.path
         ended = self._at_its_lengths(found, objective)
-        self.points = []  # these are of other lengths
+        self.points, self.along = [], None  # these are of other lengths
         stationary = ended.why is Reason.STATIONARY
         self.unmet = spurious_sentence(self.problem, ended.x) if stationary else ""
         if stationary and ended.saved:

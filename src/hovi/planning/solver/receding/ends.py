@@ -36,7 +36,7 @@ NEARLY_AT_REST = 0.05
 KEPT_OPTIONS = (
     *("duration", "time_weight", "tolerance", "scheme", "intervals", "limits", "via", "weight"),
     *("objective", "smooth", "obstacles", "grasped", "margin", "self_collision", "group", "turns"),
-    *("starts", "continuation", "processes", "conditions", "keep"),
+    *("starts", "continuation", "processes", "conditions", "keep", "repeat"),
 )
 """Options of `plan` that `replan` and `advance` keep, or have no use for."""
 ROOM = 5e-7
