@@ -83,24 +83,30 @@ def nearest_to_bounds(motion: Trajectory, given: Condition[TwoSided, Any]) -> tu
 
     Negative beyond a bound. The time in [s].
     """
-    sides, at = largest_excess(motion, given)
-    side, k, entry = np.unravel_index(int(np.argmax(sides)), sides.shape)
-    time = motion.t[k] + at[side, k, entry] * motion.grid.steps[k]
-    return -float(sides[side, k, entry]), float(time)
+    excess, _, k, s, _ = _worst_place(motion, given)
+    return -excess, float(motion.t[k] + s * motion.grid.steps[k])
 
 
 def worst(motion: Trajectory, given: Condition[TwoSided, Any]) -> tuple[float, str]:
     """The largest excess as a fraction of the scale, and the value, time and bound in words."""
-    sides, at = largest_excess(motion, given)
-    side, k, entry = np.unravel_index(int(np.argmax(sides)), sides.shape)
-    y, low, high, t = _values(motion, given, np.array([k]), at[side, [k], entry])
+    excess, side, k, s, entry = _worst_place(motion, given)
+    y, low, high, t = _values(motion, given, np.array([k]), np.array([s]))
     value, bound = given.shown_apart(y[0, entry], (low, high)[side][0, entry])
-    named = given.y.named(int(entry))
-    subject, unit = named or (in_words(given, int(entry)), given.unit)
-    return float(sides[side, k, entry]), (
+    named = given.y.named(entry)
+    subject, unit = named or (in_words(given, entry), given.unit)
+    return excess, (
         f"{subject} reaches {value}{unit and f' {unit}'} at t = {t[0]:.3g} s, its "
         f"{'limit' if named else 'bound'} is {bound}"
     )
+
+
+def _worst_place(
+    motion: Trajectory, given: Condition[TwoSided, Any]
+) -> tuple[float, int, int, float, int]:
+    """The largest excess, its side, its interval and position there, and its entry."""
+    sides, at = largest_excess(motion, given)
+    side, k, entry = map(int, np.unravel_index(int(np.argmax(sides)), sides.shape))
+    return float(sides[side, k, entry]), side, k, float(at[side, k, entry]), entry
 
 
 def undecided(motion: Trajectory, given: Condition[Between, Any]) -> str:

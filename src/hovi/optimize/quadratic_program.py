@@ -102,14 +102,11 @@ class QuadraticProgram:
         inner = model.inner if isinstance(model, EquationModel) else model
         return inner.factor(shift) is not None
 
-    def solved(
-        self, solver: str, scale: float, penalty: float = np.inf, guess: Array | None = None
-    ) -> QuadraticStep | None:
+    def solved(self, solver: str, scale: float, penalty: float = np.inf) -> QuadraticStep | None:
         """The solution for a convex H by a solver of CasADi; None where it finds none.
 
         solver: one of OPTIONS. scale: magnitude of the objective. penalty: of w times the excess of
-        y + J s, per scale; bounds may not be exceeded at all for an infinite one. guess: a step to
-        start from, where the solver takes one.
+        y + J s, per scale; bounds may not be exceeded at all for an infinite one.
         """
         import casadi  # slow to import, and only needed here
         from scipy.sparse import block_diag, csc_matrix, hstack, identity, vstack
@@ -134,7 +131,6 @@ class QuadraticProgram:
             h=casadi.DM(patterns["h"], H.data),
             a=casadi.DM(patterns["a"], rows.data),
             **{"g": g, "lba": lower, "uba": upper, "lbx": least},
-            x0=np.zeros(len(g)) if guess is None else np.append(guess, np.zeros(len(g) - n)),
         )
         s = found["x"].full().ravel()[:n]
         z = found["lam_a"].full().ravel() * scale
