@@ -486,7 +486,7 @@ def test_a_script_in_a_terminal_keeps_its_page_until_ctrl_c(tmp_path: Path) -> N
             assert page.status == 200
         assert process.poll() is None
         process.send_signal(signal.SIGINT)
-        assert process.wait(timeout=20) == 0
+        assert process.wait(timeout=60) == 0
     finally:
         process.kill()
         process.wait()

@@ -8,6 +8,7 @@ import contextlib
 import os
 import sys
 import threading
+import time
 import webbrowser
 from collections.abc import Callable
 
@@ -43,10 +44,16 @@ def has_browser() -> bool:
     return True
 
 
+LOOK_SECONDS = 0.5
+"""How often an endless wait looks for Ctrl-C: a signal that comes just before the wait begins, or
+that the system hands to another thread, does not end it."""
+
+
 def wait_for_interrupt() -> None:
     """Wait until Ctrl-C."""
     with contextlib.suppress(KeyboardInterrupt):
-        threading.Event().wait()
+        while True:
+            time.sleep(LOOK_SECONDS)
 
 
 def wait_at_exit(sentence: str, open_still: Callable[[], bool]) -> None:

@@ -51,9 +51,8 @@ def _serve(
 ) -> None:
     """Serve the page until Ctrl-C, the regular end of a replay."""
     import contextlib
-    import threading
 
-    from hovi.system.terminal import has_browser
+    from hovi.system.terminal import has_browser, wait_for_interrupt
     from hovi.viewing.replay_session import check_speed, serve
 
     check_speed(speed)
@@ -68,7 +67,7 @@ def _serve(
             loop=loop,
         )
         with shown:
-            threading.Event().wait()
+            wait_for_interrupt()
 
 
 def _announce(address: str) -> None:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import asyncio
 import base64
+import contextlib
 import html
 import queue
 import threading
@@ -25,6 +26,7 @@ from hovi.planning.task_file.reading import load_task
 from hovi.planning.task_file.task_plan import plan_task
 from hovi.robot.bundled_models import example
 from hovi.system.dataclass import dataclass
+from hovi.system.terminal import LOOK_SECONDS
 from hovi.viewing.meshcat_server import limited_server, open_listener
 from hovi.viewing.replay_session import page_of
 
@@ -152,12 +154,17 @@ class DemoServer:
 
         tell: called with a line of text for each motion.
         """
-        while (chosen := self._chosen.get()) is not None:
+        while (chosen := self._next()) is not None:
             try:
                 page = self._page(chosen, tell)
             except HoviError as error:
                 page = f"<!DOCTYPE html><meta charset='utf-8'><p>{html.escape(str(error))}</p>"
             self._loop.call_soon_threadsafe(self._pages[chosen.scene].set_result, page)
+
+    def _next(self) -> Demonstration | None:
+        while True:
+            with contextlib.suppress(queue.Empty):
+                return self._chosen.get(timeout=LOOK_SECONDS)
 
     def _page(self, chosen: Demonstration, tell: Callable[[str], object]) -> str:
         if chosen is MOTIONS[0]:
