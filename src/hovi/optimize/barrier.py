@@ -168,7 +168,8 @@ class Barrier:
         margin = ADDED_MARGIN * self.mu / self.scale
         margin = float(np.clip(margin, LEAST_ADDED_MARGIN, INITIAL_MARGIN))
         inside = np.where(np.arange(len(y)) >= old, margin, 0.0)
-        s = np.append(self.s[kept] + self._moved_inside(y[:old] - before, kept), y[old:])
+        moved = self._moved_inside(y[:old] - before, kept) + self._moved_with(bounds, kept)
+        s = np.append(self.s[kept] + moved, y[old:])
         whole = Barrier.central(bounds, s, self.mu, self.scale, inside)
         for z, former in ((whole.zl, self.zl), (whole.zu, self.zu)):
             z[:old] = former[kept]
@@ -181,6 +182,13 @@ class Barrier:
         free_above, free_below = ~bounds.has_upper[kept], ~bounds.has_lower[kept]
         up, down = np.where(free_above, change, 0.0), np.where(free_below, change, 0.0)
         return np.maximum(up, 0.0) + np.minimum(down, 0.0)
+
+    def _moved_with(self, bounds: Bounds, kept: Index) -> Array:
+        """The changes of the bounds of outputs, of which the one with the larger multiplier."""
+        old, former = len(kept), self.bounds
+        low = _changes(former.lower[kept], bounds.lower[:old])
+        high = _changes(former.upper[kept], bounds.upper[:old])
+        return np.where(self.zu[kept] > self.zl[kept], high, low)
 
     def of(self, chosen: Index) -> Barrier:
         """The slacks and multipliers of some outputs; without force for the number -1."""
@@ -321,6 +329,11 @@ class Barrier:
         zl = np.where(self.bounds.has_lower, np.clip(self.zl, low / below, high / below), 0.0)
         zu = np.where(self.bounds.has_upper, np.clip(self.zu, low / above, high / above), 0.0)
         return dataclasses.replace(self, zl=zl, zu=zu)
+
+
+def _changes(before: Array, now: Array) -> Array:
+    """Changes of bounds; 0 of those that are infinite."""
+    return np.where(np.isfinite(before), now - np.where(np.isfinite(before), before, 0.0), 0.0)
 
 
 def _gaps(bounds: Bounds, s: Array) -> Pair:

@@ -144,8 +144,7 @@ class Ended(Generic[X, Z]):
         """Keep the current point if it is within the bounds, and better than the one kept."""
         if self.kept is not None and self.kept[1].value <= self.outputs.value:
             return
-        y = self.outputs.y
-        if max(np.max(bounds.lower - y, initial=0.0), np.max(y - bounds.upper, initial=0.0)) < KEPT:
+        if bounds.excess(self.outputs.y).max(initial=0.0) < KEPT:
             self.kept = self.x, self.outputs
 
     @property

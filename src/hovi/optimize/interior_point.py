@@ -41,7 +41,7 @@ import numpy.typing as npt
 from hovi.optimize.barrier import Barrier, Direction
 from hovi.optimize.bounded_steps import LAST_MU, SHORT_FRACTION, BoundedStep, BoundedSteps
 from hovi.optimize.criteria import Criteria
-from hovi.optimize.ended import FEASIBILITY_TOLERANCE, Ended, Iteration, Outputs, Reason
+from hovi.optimize.ended import FEASIBILITY_TOLERANCE, KEPT, Ended, Iteration, Outputs, Reason
 from hovi.optimize.kkt_model import size_of
 from hovi.optimize.observed import between_steps
 from hovi.optimize.program import Program, Refinement
@@ -398,6 +398,8 @@ class _Iteration(BoundedSteps[X]):
         if kept is not None:
             last = kept[0] is ended.x
             kept = kept[0], outputs if last else self.objective.outputs(kept[0])
+            outside = self.objective.bounds.excess(kept[1].y).max(initial=0.0)
+            kept = kept if outside < KEPT else None
         before = ended.outputs.y[found.kept]
         barrier = ended.z.refined(
             self.objective.bounds, outputs.y, found.kept, found.origin, before

@@ -7,7 +7,7 @@ import dataclasses
 import itertools
 from collections.abc import Callable, Iterator
 from functools import cached_property
-from typing import Self
+from typing import Self, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -19,7 +19,7 @@ from hovi.discrete.discrete_lagrangian import Batch
 from hovi.discrete.grid import DiscretePath
 from hovi.errors import InputError
 from hovi.optimize.banded_model import BandModel
-from hovi.optimize.barrier import Bounds
+from hovi.optimize.barrier import MOST_MARGIN, Bounds
 from hovi.optimize.ended import Outputs
 from hovi.optimize.equation_model import EquationModel
 from hovi.optimize.program import Program, Refinement
@@ -36,6 +36,10 @@ from hovi.scene.lagrangian import PointTerms, over_time
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]
+
+
+Tightening: TypeAlias = Callable[[TrajectoryProblem, DiscretePath, Array, float], Array | None]
+"""From a motion of a problem, and its excess at the points, to margins; None if they stay."""
 
 
 class BoundedAction(Program[DiscretePath]):
@@ -59,6 +63,8 @@ class BoundedAction(Program[DiscretePath]):
 
     tolerances: tuple[float, float] | None = None
     penalty: float = 0.0
+    tightening: Tightening | None = None
+    """The margins that a motion calls for, None for those that it has: see BoundedSearch."""
 
     def __init__(
         self,
@@ -420,13 +426,41 @@ class BoundedAction(Program[DiscretePath]):
         if self.rows is None:
             return None
         known = None if forces is None else self.plain(forces)[self.row_outputs]
-        found = self.rows.refine(x, level, known)
-        if found is None:
+        before, found = self.rows.size, self.rows.refine(x, level, known)
+        tighter = self._tightened(x, level)
+        if found is None and not tighter:
             return None
+        none = np.zeros(0, dtype=np.intp)
+        of_rows = found or Refinement(np.arange(before), none)
         self._with_rows()
         first = self._point_count
-        kept = np.append(np.arange(first), first + found.kept)
-        return Refinement(kept, np.where(found.origin < 0, -1, first + found.origin))
+        kept = np.append(np.arange(first), first + of_rows.kept)
+        return Refinement(kept, np.where(of_rows.origin < 0, -1, first + of_rows.origin))
+
+    def _tightened(self, x: DiscretePath, level: float) -> bool:
+        """Whether bounds at the points were tightened for what the motion exceeds between them."""
+        if self.tightening is None or self._point_count == 0:
+            return False
+        margins = self.tightening(self.problem, x, self._excess_at_points(x), level)
+        if margins is None:
+            return False
+        self._at_points = self._point_bounds(margins)
+        return True
+
+    def _excess_at_points(self, x: DiscretePath) -> Array:
+        """The largest excess at the points of every interval, shaped as margins; -inf for none."""
+        y = self.at_points(self._bounded_outputs(x, self.action.outputs(x)))
+        lower, upper, _ = self._point_bounds(None)
+        intervals, first = np.concatenate(self.ld.point_intervals), self.limits.lower.size
+        found = np.full(
+            (2, self.ld.grid.intervals, first + y.shape[1] - len(self.columns)), -np.inf
+        )
+        chosen = np.append(self._bounded, np.arange(first, found.shape[2]))
+        for side, excess in enumerate((lower - y, y - upper)):
+            of_chosen = np.full((len(found[0]), y.shape[1]), -np.inf)
+            np.maximum.at(of_chosen, intervals, excess)
+            found[side][:, chosen] = of_chosen
+        return found
 
     def retract(self, x: DiscretePath, step: Array, model: QuadraticModel) -> DiscretePath:
         """The path moved by a step."""
@@ -437,6 +471,7 @@ class BoundedAction(Program[DiscretePath]):
         other = copy.copy(self)
         other.action = copy.copy(self.action)
         other.rows = None if self.rows is None else self.rows.fixed_on(self.rows.grid)
+        other.tightening = None
         return other
 
     def stretched(self, problem: TrajectoryProblem) -> Self:
@@ -572,7 +607,9 @@ class BoundedAction(Program[DiscretePath]):
         tightening = margins.reshape(2, len(margins[0]), -1)
         first = self.limits.lower.size
         chosen = np.append(self._bounded, np.arange(first, first + size))
-        tightening = tightening[:, :, chosen][:, intervals]
+        tightening = np.minimum(
+            tightening[:, :, chosen][:, intervals], MOST_MARGIN * (upper - lower)
+        )
         return lower + tightening[0], upper - tightening[1], weights
 
     def _wider(self, side: int) -> Array:

@@ -32,7 +32,7 @@ from hovi.planning.solver.methods.bounded_search import (
     BoundedSearch,
 )
 from hovi.planning.solver.methods.feasibility import solved_from
-from hovi.planning.solver.methods.limits_between_points import tightened, usable
+from hovi.planning.solver.methods.limits_between_points import halved, usable
 from hovi.planning.solver.methods.method import Guess
 from hovi.planning.solver.missed_equations import spurious_sentence
 from hovi.planning.solver.near.cleared_action import ClearedAction
@@ -168,7 +168,7 @@ def _searched(search: TimedSearch) -> Answer:
     ended = _at_the_points(search)
     if ended.why in STOPPED or not usable(ended):
         return _ended(search, ended.why)
-    ended, reason, _ = tightened(search, ended)
+    ended, reason, _ = halved(search, ended)
     reason = reason or search.unmet
     if not reason and ended.why is Reason.STATIONARY:  # others may just lack rows yet
         reason = search.too_close(ended.x)

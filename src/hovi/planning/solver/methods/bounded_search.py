@@ -77,6 +77,12 @@ LOOK_AROUND = 0.02
 """Distance beyond the least one up to which pairs near a known motion get rows, in [m]."""
 
 
+LARGEST_MARGIN = 0.05
+"""Largest margin, as a fraction of the range; where more is exceeded, intervals are halved."""
+UNUSED_MARGIN = 1e-3
+"""Unused fraction of a range above which a tightened bound is relaxed again."""
+
+
 @dataclass(eq=False)
 class BoundedSearch:
     """The current problem of a search, and the resources used so far.
@@ -191,6 +197,9 @@ class BoundedSearch:
         """
         objective = self._objective(known, algebra)
         objective.tolerances = None if known is None else tolerances
+        if not self.rows.fixed:
+            objective.tightening = self.tightening
+            self.relaxed_at = np.inf
         return objective
 
     def _objective(self, known: Multipliers | None, algebra: LinearAlgebra | None) -> BoundedAction:
@@ -220,7 +229,9 @@ class BoundedSearch:
         """Where a solve ended, with its objective; None if it was not the last one."""
         if self.solved is None or self.solved[0] is not ended:
             return None
-        return SolvedBounds(self.solved[1], ended.z)
+        objective = self.solved[1]
+        objective.tightening = None  # it is solved, and this search is no part of it
+        return SolvedBounds(objective, ended.z)
 
     def _add_points(self, ended: Bounded, objective: BoundedAction) -> None:
         """Add the points at which the barrier of a solve was larger to those of earlier solves.
@@ -354,12 +365,13 @@ class BoundedSearch:
         model = objective.model(ended.x, *ended.z.condensed(ended.outputs.y))
         return model.negative_eigenvalues() if isinstance(model, MergeTreeModel) else -1
 
-    def excess(self, path: DiscretePath) -> Array:
+    def excess(self, path: DiscretePath, problem: TrajectoryProblem | None = None) -> Array:
         """Excess over lower and upper bounds in every interval, shaped as `no_margins`.
 
-        -inf for what rows bound, which holds by construction.
+        -inf for what rows bound, which holds by construction. problem: of the motion, if it is not
+        that of the search.
         """
-        trajectory = self.problem.trajectory(path)
+        trajectory = (problem or self.problem).trajectory(path)
         sides = np.full((2, trajectory.grid.intervals, *self.limits.lower.shape), -np.inf)
         for each in limit_conditions(self.limits, trajectory.grid.order, trajectory.space):
             if isinstance(each.where, AtPoints) and isinstance(each.on, LimitRange):
@@ -369,6 +381,32 @@ class BoundedSearch:
         if more is None:
             return sides
         return np.concatenate([sides, more.excess(trajectory, self.limits.tolerance)], axis=2)
+
+    def tightening(
+        self, problem: TrajectoryProblem, path: DiscretePath, at_points: Array, level: float
+    ) -> Array | None:
+        """Margins for what a motion exceeds between the points only; None if they stay.
+
+        Bounds that are tightened while a solve runs take no other solve to be kept.
+        problem: of the motion. at_points: the excess there, shaped as `no_margins`.
+        """
+        if not (at_points > -LARGEST_MARGIN).any():
+            return None
+        between, tolerance = self.excess(path, problem), self.limits.tolerance
+        known = np.isfinite(at_points)
+        bulge = np.where(known, between - np.where(known, at_points, 0.0), 0.0)
+        near = known & (at_points > -LARGEST_MARGIN)
+        held = near & ((between > tolerance) | (self.margins > 0.0))
+        wanted = np.where(held, np.clip(bulge + 0.5 * tolerance, 0.0, LARGEST_MARGIN), 0.0)
+        exceeds = (between > tolerance) & (wanted > self.margins)
+        unused = (self.margins > 0.0) & (wanted < self.margins - UNUSED_MARGIN)
+        relaxes = level <= 0.3 * self.relaxed_at
+        if not (exceeds.any() or (relaxes and unused.any())):
+            return None
+        self.margins = wanted if relaxes else np.maximum(self.margins, wanted)
+        if relaxes:
+            self.relaxed_at = level
+        return self.margins
 
     def too_close(self, path: DiscretePath) -> str:
         """Which pair comes closer than the margin where there are rows of distances; "" if none."""

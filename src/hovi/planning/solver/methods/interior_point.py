@@ -14,7 +14,7 @@ from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.answer import Answer
 from hovi.planning.solver.methods.bounded_search import BoundedSearch
 from hovi.planning.solver.methods.feasibility import feasible_motion
-from hovi.planning.solver.methods.limits_between_points import tightened, usable
+from hovi.planning.solver.methods.limits_between_points import halved, usable
 from hovi.planning.solver.methods.method import Guess, ProblemMethod, Report
 from hovi.planning.solver.missed_equations import missed_sentence
 from hovi.planning.solver.non_finite import non_finite_condition, non_finite_sentence
@@ -77,7 +77,7 @@ def _searched(search: BoundedSearch) -> Answer:
     ended, reason = feasible_motion(search)
     reason, excess = reason or search.unmet, 0.0
     if not reason and usable(ended) and not search.rows.fixed:
-        ended, reason, excess = tightened(search, ended)
+        ended, reason, excess = halved(search, ended)
         reason = reason or search.unmet
         if not reason and ended.why is Reason.STATIONARY:  # others may just lack rows yet
             reason = search.too_close(ended.x)

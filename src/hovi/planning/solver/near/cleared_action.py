@@ -177,7 +177,8 @@ class ClearedAction(BoundedAction):
         sharper = self.near.sharpen(x)
         added = self.near.extend(self.problem, x, AHEAD * level * DISTANCE_SCALE)
         self.blocked = self.near.blocked
-        if found is None and added == 0 and not sharper:
+        tighter = self._tightened(x, level)
+        if found is None and added == 0 and not (sharper or tighter):
             return None
         kept, origin = np.arange(before), np.zeros(0, dtype=np.intp)
         if found is not None:
