@@ -7,7 +7,7 @@ import dataclasses
 import itertools
 from collections.abc import Callable, Iterator
 from functools import cached_property
-from typing import Self, TypeAlias
+from typing import Self
 
 import numpy as np
 import numpy.typing as npt
@@ -28,6 +28,7 @@ from hovi.optimize.quadratic_program import QuadraticProgram
 from hovi.planning.problem.limits import Limits, limited_columns
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.action_objective import ActionObjective, LinearAlgebra
+from hovi.planning.solver.between_points import MarginsBetweenPoints
 from hovi.planning.solver.condition_outputs import ConditionOutputs
 from hovi.planning.solver.limits.limit_rows import LimitRows, push_rows
 from hovi.planning.solver.missed_equations import within
@@ -36,10 +37,6 @@ from hovi.scene.lagrangian import PointTerms, over_time
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]
-
-
-Tightening: TypeAlias = Callable[[TrajectoryProblem, DiscretePath, Array, float], Array | None]
-"""From a motion of a problem, and its excess at the points, to margins; None if they stay."""
 
 
 class BoundedAction(Program[DiscretePath]):
@@ -63,8 +60,8 @@ class BoundedAction(Program[DiscretePath]):
 
     tolerances: tuple[float, float] | None = None
     penalty: float = 0.0
-    tightening: Tightening | None = None
-    """The margins that a motion calls for, None for those that it has: see BoundedSearch."""
+    between: MarginsBetweenPoints | None = None
+    """Margins that follow the motion while it is sought; None if they stay."""
 
     def __init__(
         self,
@@ -438,13 +435,12 @@ class BoundedAction(Program[DiscretePath]):
         return Refinement(kept, np.where(of_rows.origin < 0, -1, first + of_rows.origin))
 
     def _tightened(self, x: DiscretePath, level: float) -> bool:
-        """Whether bounds at the points were tightened for what the motion exceeds between them."""
-        if self.tightening is None or self._point_count == 0:
+        """Whether bounds at the points are others for what the motion exceeds between them."""
+        if self.between is None or self._point_count == 0:
             return False
-        margins = self.tightening(self.problem, x, self._excess_at_points(x), level)
-        if margins is None:
+        if not self.between.follow(self.problem, x, self._excess_at_points(x), level):
             return False
-        self._at_points = self._point_bounds(margins)
+        self._at_points = self._point_bounds(self.between.values)
         return True
 
     def _excess_at_points(self, x: DiscretePath) -> Array:
@@ -471,7 +467,7 @@ class BoundedAction(Program[DiscretePath]):
         other = copy.copy(self)
         other.action = copy.copy(self.action)
         other.rows = None if self.rows is None else self.rows.fixed_on(self.rows.grid)
-        other.tightening = None
+        other.between = None
         return other
 
     def stretched(self, problem: TrajectoryProblem) -> Self:

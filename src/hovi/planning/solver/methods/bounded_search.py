@@ -35,6 +35,7 @@ from hovi.planning.problem.presolve.end_torques import static_sentence
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.action_objective import ActionObjective, LinearAlgebra
 from hovi.planning.solver.answer import Answer
+from hovi.planning.solver.between_points import MarginsBetweenPoints
 from hovi.planning.solver.bounded_action import BoundedAction
 from hovi.planning.solver.central_path import CentralPath
 from hovi.planning.solver.condition_outputs import ConditionOutputs
@@ -77,12 +78,6 @@ LOOK_AROUND = 0.02
 """Distance beyond the least one up to which pairs near a known motion get rows, in [m]."""
 
 
-LARGEST_MARGIN = 0.05
-"""Largest margin, as a fraction of the range; where more is exceeded, intervals are halved."""
-UNUSED_MARGIN = 1e-3
-"""Unused fraction of a range above which a tightened bound is relaxed again."""
-
-
 @dataclass(eq=False)
 class BoundedSearch:
     """The current problem of a search, and the resources used so far.
@@ -90,8 +85,7 @@ class BoundedSearch:
     problem: on the current grid; its intervals are halved where limits do not hold.
     start: the initial guess; guess: the same on the problem's grid.
     iterations: steps of all solves.
-    margins: fraction of its range by which each bound is tightened in each interval, shape
-        (2, N, kinds nv + values of conditions).
+    margins: by which bounds at the points are tightened.
     multipliers, unmet: of the constraints, and why they cannot be satisfied, or "".
     last: the problem and the motion of the last solve. solved: how it ended, and its objective.
     free: a motion that was found without distances, if there is one.
@@ -146,11 +140,12 @@ class BoundedSearch:
         """The least distance with the extra clearance where it is bounded, in [m]."""
         return self.least_distance + EXTRA_CLEARANCE * DISTANCE_SCALE
 
-    def no_margins(self) -> Array:
-        """Zero margins, shape (2, N, kinds nv + values of conditions)."""
+    def no_margins(self) -> MarginsBetweenPoints:
+        """Zero margins, (2, N, kinds nv + values of conditions)."""
         more = self.more
         size = self.limits.lower.size + (0 if more is None else more.size)
-        return np.zeros((2, self.problem.grid.intervals, size))
+        shape = 2, self.problem.grid.intervals, size
+        return MarginsBetweenPoints(self.excess_of, self.limits.tolerance, shape)
 
     @property
     def more(self) -> ConditionOutputs | None:
@@ -198,19 +193,19 @@ class BoundedSearch:
         objective = self._objective(known, algebra)
         objective.tolerances = None if known is None else tolerances
         if not self.rows.fixed:
-            objective.tightening = self.tightening
-            self.relaxed_at = np.inf
+            self.margins.begin()
+            objective.between = self.margins
         return objective
 
     def _objective(self, known: Multipliers | None, algebra: LinearAlgebra | None) -> BoundedAction:
         more = self.more
         if self.near is not None:
-            common = self.problem, self.limits, self.margins, algebra, known, more
+            common = self.problem, self.limits, self.margins.values, algebra, known, more
             cleared = ClearedAction(*common, self.rows, self.near)
             cleared.radii = (BoundedAction if self.at_level else ClearedAction).radii
             return cleared
         return BoundedAction(
-            self.problem, self.limits, self.margins, algebra, known, more, self.rows
+            self.problem, self.limits, self.margins.values, algebra, known, more, self.rows
         )
 
     def central_path(self, ended: Bounded) -> CentralPath:
@@ -230,7 +225,7 @@ class BoundedSearch:
         if self.solved is None or self.solved[0] is not ended:
             return None
         objective = self.solved[1]
-        objective.tightening = None  # it is solved, and this search is no part of it
+        objective.between = None  # it is solved, and this search is no part of it
         return SolvedBounds(objective, ended.z)
 
     def _add_points(self, ended: Bounded, objective: BoundedAction) -> None:
@@ -365,48 +360,25 @@ class BoundedSearch:
         model = objective.model(ended.x, *ended.z.condensed(ended.outputs.y))
         return model.negative_eigenvalues() if isinstance(model, MergeTreeModel) else -1
 
-    def excess(self, path: DiscretePath, problem: TrajectoryProblem | None = None) -> Array:
-        """Excess over lower and upper bounds in every interval, shaped as `no_margins`.
+    def excess(self, path: DiscretePath) -> Array:
+        """As excess_of, of a motion of the present problem."""
+        return self.excess_of(self.problem, path)
 
-        -inf for what rows bound, which holds by construction. problem: of the motion, if it is not
-        that of the search.
+    def excess_of(self, problem: TrajectoryProblem, path: DiscretePath) -> Array:
+        """Excess over lower and upper bounds in every interval, shaped as the margins.
+
+        -inf for what rows bound, which holds by construction.
         """
-        trajectory = (problem or self.problem).trajectory(path)
+        trajectory = problem.trajectory(path)
         sides = np.full((2, trajectory.grid.intervals, *self.limits.lower.shape), -np.inf)
         for each in limit_conditions(self.limits, trajectory.grid.order, trajectory.space):
             if isinstance(each.where, AtPoints) and isinstance(each.on, LimitRange):
                 sides[:, :, each.on.row, each.on.joints] = excess_of(trajectory, each)
         sides = sides.reshape(2, len(sides[0]), -1)
-        more = self.more
-        if more is None:
+        if self.more is None:
             return sides
-        return np.concatenate([sides, more.excess(trajectory, self.limits.tolerance)], axis=2)
-
-    def tightening(
-        self, problem: TrajectoryProblem, path: DiscretePath, at_points: Array, level: float
-    ) -> Array | None:
-        """Margins for what a motion exceeds between the points only; None if they stay.
-
-        Bounds that are tightened while a solve runs take no other solve to be kept.
-        problem: of the motion. at_points: the excess there, shaped as `no_margins`.
-        """
-        if not (at_points > -LARGEST_MARGIN).any():
-            return None
-        between, tolerance = self.excess(path, problem), self.limits.tolerance
-        known = np.isfinite(at_points)
-        bulge = np.where(known, between - np.where(known, at_points, 0.0), 0.0)
-        near = known & (at_points > -LARGEST_MARGIN)
-        held = near & ((between > tolerance) | (self.margins > 0.0))
-        wanted = np.where(held, np.clip(bulge + 0.5 * tolerance, 0.0, LARGEST_MARGIN), 0.0)
-        exceeds = (between > tolerance) & (wanted > self.margins)
-        unused = (self.margins > 0.0) & (wanted < self.margins - UNUSED_MARGIN)
-        relaxes = level <= 0.3 * self.relaxed_at
-        if not (exceeds.any() or (relaxes and unused.any())):
-            return None
-        self.margins = wanted if relaxes else np.maximum(self.margins, wanted)
-        if relaxes:
-            self.relaxed_at = level
-        return self.margins
+        more = ConditionOutputs(problem).excess(trajectory, self.limits.tolerance)
+        return np.concatenate([sides, more], axis=2)
 
     def too_close(self, path: DiscretePath) -> str:
         """Which pair comes closer than the margin where there are rows of distances; "" if none."""

@@ -1,0 +1,81 @@
+"""Bounds at the quadrature points, tightened for what a motion exceeds between the points.
+
+A bound is tightened by as much as the motion comes nearer to it between the points of an interval
+than at them, so that it just reaches the bound there. This changes with the motion: while the
+barrier falls margins follow it both ways, and at each barrier parameter one that was relaxed and is
+exceeded again stays. So a solve ends within its bounds everywhere, where otherwise solves would
+have to be repeated with other margins. Exchange methods [HettichKortanek1993] add the instant at
+which a bound is exceeded instead.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi.discrete.grid import DiscretePath
+from hovi.planning.problem.problem import TrajectoryProblem
+
+Array = npt.NDArray[np.float64]
+
+LARGEST_MARGIN = 0.05
+"""Largest margin, as a fraction of the range; where more is exceeded, intervals are halved."""
+UNUSED = 10.0
+"""Unused margin, in tolerances, from which it is relaxed."""
+NEXT_LEVEL = 0.3
+"""Barrier parameter, relative to the one before, at which every margin may be relaxed again."""
+
+
+class MarginsBetweenPoints:
+    """Margins of bounds at the points of a grid.
+
+    excess: over the lower and upper bounds of each interval, at all times, (2, N, K), from a motion
+        of a problem; as fractions of the ranges.
+    tolerance: largest excess that is none.
+    values: by which bounds are tightened, (2, N, K).
+    """
+
+    def __init__(
+        self,
+        excess: Callable[[TrajectoryProblem, DiscretePath], Array],
+        tolerance: float,
+        shape: tuple[int, int, int],
+    ) -> None:
+        self.excess, self.tolerance = excess, tolerance
+        self.values = np.zeros(shape)
+        self.begin()
+
+    def begin(self) -> None:
+        """Begin another solve, in which margins may be relaxed."""
+        self._level = np.inf
+        self._relaxed = self._firm = np.zeros(self.values.shape, dtype=bool)
+
+    def follow(
+        self, problem: TrajectoryProblem, path: DiscretePath, at_points: Array, level: float
+    ) -> bool:
+        """Take the margins that a motion calls for; whether any of them changed.
+
+        at_points: the excess there, (2, N, K); -inf for what is not bounded at points.
+        level: barrier parameter at the motion, relative to the mean density of the cost.
+        """
+        near = at_points > -LARGEST_MARGIN
+        if not near.any():
+            return False
+        between = self.excess(problem, path)
+        beyond = np.where(near, between - np.where(near, at_points, 0.0), 0.0)
+        held = near & ((between > self.tolerance) | (self.values > 0.0))
+        more = np.clip(beyond + 0.5 * self.tolerance, 0.0, LARGEST_MARGIN)
+        wanted = np.where(held, more, 0.0)
+        if level <= NEXT_LEVEL * self._level:
+            self.begin()
+            self._level = level
+        exceeded = (between > self.tolerance) & (wanted > self.values)
+        self._firm = self._firm | (self._relaxed & exceeded)
+        relaxed = (wanted < self.values - UNUSED * self.tolerance) & ~self._firm
+        if not (exceeded | relaxed).any():
+            return False
+        self._relaxed = self._relaxed | relaxed
+        self.values = np.where(relaxed, wanted, np.maximum(self.values, wanted))
+        return True
