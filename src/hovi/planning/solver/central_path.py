@@ -37,6 +37,7 @@ class CentralPath:
     barrier: slacks and multipliers of the solution, at the points and in the rows; None for none.
     near: rows of distances; None to find them anew.
     conditions: multipliers of the conditions; None for none.
+    margins: of bounds at the points for what the solution does between them; None for none.
     """
 
     points: tuple[tuple[float, DiscretePath], ...]
@@ -44,6 +45,7 @@ class CentralPath:
     barrier: Barrier | None = None
     near: ClearanceRows | None = None
     conditions: tuple[Array, ...] | None = None
+    margins: Array | None = None
 
     def __getstate__(self) -> dict[str, Any]:
         """The state without rows of distances, which are found anew where it was sent to."""

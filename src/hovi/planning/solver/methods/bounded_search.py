@@ -218,7 +218,8 @@ class BoundedSearch:
         barrier = ended.z if apart else None
         known = None if len(self.problem.passive) > 0 else self.multipliers
         conditions = None if known is None else tuple(known.conditions)
-        return CentralPath(points, self.rows, barrier, self.near, conditions)
+        margins = self.margins.values
+        return CentralPath(points, self.rows, barrier, self.near, conditions, margins)
 
     def solved_bounds(self, ended: Bounded) -> SolvedBounds | None:
         """Where a solve ended, with its objective; None if it was not the last one."""

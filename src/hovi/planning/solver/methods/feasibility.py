@@ -123,6 +123,8 @@ def _adopt(search: BoundedSearch, along: CentralPath) -> None:
     """Take over the rows and multipliers of a similar problem on as many intervals."""
     if along.rows is not None:
         search.rows = along.rows.copied()
+    if along.margins is not None and along.margins.shape == search.margins.values.shape:
+        search.margins.values = along.margins
     if along.near is not None and search.near is not None:
         search.near = along.near.on(search.problem)
     if along.conditions is not None:

@@ -11,6 +11,8 @@ import numpy.typing as npt
 
 from hovi.discrete.guess import stretched
 from hovi.optimize.ended import STOPPED, Reason
+from hovi.optimize.start import Start
+from hovi.planning.solver.between_points import LARGEST_MARGIN
 from hovi.planning.solver.methods.bounded_search import Bounded, BoundedSearch
 from hovi.planning.solver.methods.feasibility import feasible_motion, solved_from
 
@@ -31,12 +33,17 @@ def halved(search: BoundedSearch, ended: Bounded) -> tuple[Bounded, str, float]:
     Returns how the last solve ended, the reason for infeasibility or "", and the largest excess.
     """
     reason, tolerance = "", search.limits.tolerance
-    for halvings in range(MAX_HALVINGS + 1):
+    again, halvings = False, 0
+    while True:
         sides = search.excess(ended.x)
         excess = float(sides.max())
         if excess <= tolerance or halvings == MAX_HALVINGS or not usable(ended):
             break
-        ended, reason = _solved_on_halves(search, ended, sides)
+        if again or excess > LARGEST_MARGIN:
+            ended, reason = _solved_on_halves(search, ended, sides)
+            again, halvings = False, halvings + 1
+        else:  # margins did not follow the motion to the end, or not at all
+            ended, again = search.solve(Start(ended.x, ended.z)), True
     if not reason and excess > tolerance and ended.why in (Reason.STATIONARY, Reason.DIVERGED):
         reason = (
             f"{search.worst(ended.x)}, between the quadrature points, at which limits are "
