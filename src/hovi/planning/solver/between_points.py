@@ -77,5 +77,6 @@ class MarginsBetweenPoints:
         if not (exceeded | relaxed).any():
             return False
         self._relaxed = self._relaxed | relaxed
-        self.values = np.where(relaxed, wanted, np.maximum(self.values, wanted))
+        half = 0.5 * (self.values + wanted)
+        self.values = np.where(relaxed, half, np.maximum(self.values, wanted))
         return True
