@@ -1,8 +1,8 @@
 """Random tasks that keep a line, a plane, a direction or a speed, within the URDF's limits.
 
 Each has a way by inverse kinematics whose least time, with a fifth in reserve, is shorter than the
-duration (kept_paths.py), and along which the given meshes of links are twice the margin apart:
-links are kept apart by default, as convex hulls. Motions are judged at 20,000 samples by Pinocchio
+duration (kept_paths.py), and along which the given meshes of links are APART apart: links are kept
+apart by default, as convex hulls. Motions are judged at 20,000 samples by Pinocchio
 alone: what is kept, limits on q, v and the torques of pin.rnea, and the integral of 1/2 |tau|^2;
 and, at fewer, the distances of the meshes by Coal. Steps and times of plans are also given relative
 to the plan of the same ends without what is kept.
@@ -31,6 +31,9 @@ Array = npt.NDArray[np.float64]
 
 ARMS = ("ur5", "ur10", "panda", "kinova", "xarm7", "z1")
 SAMPLES = 20_000
+APART = 1.5 * DEFAULT_MARGIN
+"""Least distance of meshes along the way, in [m]: hulls are larger, and a UR10's upper arm is never
+farther than twice the margin from its base."""
 MAX_EXCESS = 1e-6
 """Largest excess over a limit of a motion that holds it, as a fraction of its range."""
 DISTANCE, ANGLE = 1e-5, np.deg2rad(0.01)
@@ -68,7 +71,7 @@ def measure(arm: str, kind: str, count: int, seed: int, time_limit: float) -> li
     rows = []
 
     def apart(way: Array) -> bool:
-        return bool(meshes.distances(way).min() >= 2 * DEFAULT_MARGIN)
+        return bool(meshes.distances(way).min() >= APART)
 
     for number, task in enumerate(random_tasks(scene, kind, count, seed, apart)):
         planned = partial(hovi.plan, scene, task.start, duration=task.duration)
