@@ -7,14 +7,17 @@ alone: what is kept, limits on q, v and the torques of pin.rnea, and the integra
 and, at fewer, the distances of the meshes by Coal. Steps and times of plans are also given relative
 to the plan of the same ends without what is kept.
 
-    python kept_tasks.py [ARM ...] [--count 2] [--seed 0] [--kind WORD]
+    python kept_tasks.py [ARM ...] [--count 2] [--seed 0] [--kind WORD] [--runs FILE]
 """
 
 from __future__ import annotations
 
 import argparse
+import dataclasses
+import json
 from dataclasses import dataclass
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
@@ -151,10 +154,17 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--kind", default="", help="only kinds that contain this")
     parser.add_argument("--time-limit", type=float, default=60.0, help="of a plan, in [s]")
+    parser.add_argument("--runs", type=Path, help="a file of runs, which are in the table, too")
     given = parser.parse_args()
+    runs = saved_runs(given.runs)
     kinds = [each for each in KINDS if given.kind in each]
     arms, rest = given.arms or list(ARMS), (given.count, given.seed, given.time_limit)
-    runs = [run for arm in arms for kind in kinds for run in alone(measure, arm, kind, *rest)]
+    for arm in arms:
+        for kind in kinds:
+            if (arm, kind) not in {(r.arm, r.kind) for r in runs}:
+                runs += alone(measure, arm, kind, *rest)
+                save(runs, given.runs)
+    arms = [each for each in ARMS if any(r.arm == each for r in runs)]
     columns = ["", "minima", "wrong", "largest miss [mm], [deg]", "CPU s: median, max", "steps"]
     columns += ["steps / without: median, max", "CPU s / without: median, max"]
     groups = [(kind, [r for r in runs if r.kind == kind]) for kind in kinds]
@@ -167,6 +177,19 @@ def main() -> None:
                 f"- `{run.arm}` {run.number}, {run.kind}: {run.status}, {run.seconds:.2g} s: {said}"
             )
     print_machine(threads=1)
+
+
+def saved_runs(file: Path | None) -> list[Run]:
+    """The runs in a file; none without one."""
+    if file is None or not file.exists():
+        return []
+    return [Run(**json.loads(line)) for line in file.read_text().splitlines()]
+
+
+def save(runs: list[Run], file: Path | None) -> None:
+    """Write runs to a file, if there is one."""
+    if file is not None:
+        file.write_text("".join(f"{json.dumps(dataclasses.asdict(run))}\n" for run in runs))
 
 
 def row(name: str, runs: list[Run]) -> list[str]:
