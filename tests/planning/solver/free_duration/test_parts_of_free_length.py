@@ -7,12 +7,12 @@ import numpy.typing as npt
 import pytest
 
 import hovi
-from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
-from hovi.discrete.grid import Grid
 from hovi.conditions.condition import Condition
 from hovi.conditions.expression import function_of
 from hovi.conditions.places import Along
 from hovi.conditions.sets import Equal
+from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
+from hovi.discrete.grid import Grid
 from hovi.optimize.bordered_model import BorderedModel
 from hovi.optimize.equation_model import EquationModel
 from hovi.planning.problem.clock import Clock
