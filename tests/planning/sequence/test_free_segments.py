@@ -13,8 +13,6 @@ import pytest
 import hovi
 from hovi.cli.application import main
 from hovi.errors import InputError
-from hovi.planning.problem.clock import Clock
-from hovi.planning.solver.free_duration.joint_solve import solves_jointly
 from samples.small_robots import arm
 
 MASS, BOUNDS = 0.5, (0.1, 9.0)
@@ -81,7 +79,7 @@ def test_no_other_durations_cost_less(asked: str) -> None:
 
 
 def test_a_line_that_is_passed_at_a_speed_lasts_as_long_as_is_best() -> None:
-    """Down on a line, slowly in its last part: one solve for both durations; none cost less."""
+    """Down on a line, slowly in its last part: no other durations cost less."""
     scene, start = (
         hovi.Scene(hovi.load_robot("ur5"), [GRAVITY]),
         [0.3, -1.3, 1.7, -1.97, -1.57, 0.0],
@@ -101,8 +99,6 @@ def test_a_line_that_is_passed_at_a_speed_lasts_as_long_as_is_best() -> None:
     found = planned((0.1, 2.0), (0.1, 2.0), time_weight=weight)
     assert found.success, found.message
     best = np.array(lengths(found))
-    assert found.problem is not None
-    assert solves_jointly(found.problem, Clock.of_parts(2), best, near=True)
     seam = found.trajectory.sample(best[:1])
     J = pin.computeFrameJacobian(
         scene.robot.model.copy(),

@@ -21,6 +21,7 @@ from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.problem.seams import Seam
 from hovi.planning.problem.time_price import TimePrice
 from hovi.planning.solver.bounded_action import BoundedAction
+from hovi.planning.solver.free_duration.joint_solve import solves_jointly
 from hovi.planning.solver.free_duration.timed_action import TimedAction
 from hovi.planning.solver.free_duration.timed_bounded_action import TimedBoundedAction
 from hovi.planning.solver.free_duration.timed_path import TimedPath
@@ -163,6 +164,7 @@ def test_equations_between_seams_do_not_depend_on_lengths(name: str) -> None:
     model = objective.model(x, zero, zero, zero)
     hessian, inner = hessian_of(model), model.inner
     assert isinstance(inner, EquationModel)
+    assert solves_jointly(problem, clock, lengths, near=True)
     assert np.abs(model.back).max() > 1e-3
 
     def after(step: Array) -> tuple[float, Array]:
