@@ -2,7 +2,9 @@
 
 Straight lines and lines with the tool upright, to a place, on 16 intervals without limits. The
 curves, quadrature points, rows at nodes and moments are hovi's, the kernels of Ipopt are compiled
-by gcc (not timed), and both begin at the same cubic. Times are those of one thread.
+by gcc (not timed), and both begin at the same cubic. A solve is one on this grid; a plan is hovi's
+with its checks between the nodes and its comparison with a finer grid, next to Ipopt's solves on
+both grids, the second one from hovi's motion. Times are those of one thread.
 
     python kept_ipopt.py [ARM ...] [--count 3] [--seed 0]
 """
@@ -37,6 +39,7 @@ from hovi.accuracy.peers.point_program import (
 from hovi.conditions.places import Along
 from hovi.discrete.guess import cubic
 from hovi.dynamics.symbolic_dynamics import casadi_functions
+from hovi.planning.solver.solver import solve_on_grid
 
 Array = npt.NDArray[np.float64]
 
@@ -45,41 +48,50 @@ INTERVALS, MODES = 16, 2
 
 
 @dataclass(frozen=True)
+class IpoptSolve:
+    """One solve by Ipopt. seconds: processor time."""
+
+    seconds: float
+    steps: int
+    cost: float
+    status: str
+
+
+@dataclass(frozen=True)
 class KeptProgram:
     """min sum w L(p) with C y(p) = c, for outputs y of the points p = (q, v, a) of a collocation.
 
-    solution: hovi's, whose grid and rows these are.
+    problem: hovi's, whose grid and rows these are. known: the kernels, which all grids have in
+        common; compiled in a folder if None.
     """
 
-    solution: hovi.Solution
+    problem: hovi.TrajectoryProblem
     folder: Path
+    known: tuple[ca.Function, ca.Function, ca.Function] | None = None
 
     @cached_property
     def method(self) -> Collocation:
         """hovi's table, with the node before every interval as a point without weight."""
-        grid, scheme = self.solution.trajectory.grid, self.solution.trajectory.grid.schemes[0]
+        grid, scheme = self.problem.grid, self.problem.grid.schemes[0]
         points, weights = np.append(scheme.points, 0.0), np.append(scheme.weights, 0.0)
         table = with_points(collocation_table(f"lg-{scheme.inner_modes + 2}"), points, weights)
-        n = self.solution.trajectory.q.shape[1]
-        return Collocation(table, grid.intervals, grid.duration, n)
+        return Collocation(table, grid.intervals, grid.duration, self.problem.robot.nv)
 
     @cached_property
     def kept(self) -> list[tuple[ca.Function, ca.Function, Array]]:
         """Functions of q, their rates of (q, v), and the values that are kept."""
-        problem = self.solution.problem
-        assert problem is not None
-        asked = [each for each in problem.conditions if each.where == Along(0)]
+        asked = [each for each in self.problem.conditions if each.where == Along(0)]
         return [(x.y.function, x.y.rate.function, np.asarray(x.on.value)) for x in asked]
 
     @cached_property
     def kernels(self) -> tuple[ca.Function, ca.Function, ca.Function]:
         """p -> (L, y), p -> (L, dL, y, J), (p, s, l) -> Hessian of s L + l y; compiled."""
-        problem = self.solution.problem
-        assert problem is not None
+        if self.known is not None:
+            return self.known
         n = self.method.joints
         p, s = ca.SX.sym("p", 3 * n), ca.SX.sym("s")
         q, v, a = p[:n], p[n : 2 * n], p[2 * n :]
-        tau = casadi_functions(problem.scene.model).inverse_dynamics(q, v, a)
+        tau = casadi_functions(self.problem.scene.model).inverse_dynamics(q, v, a)
         y = ca.vertcat(
             *(f(q) - ca.DM(c) for f, _, c in self.kept), *(g(q, v) for _, g, _ in self.kept)
         )
@@ -98,9 +110,10 @@ class KeptProgram:
     def rows(self) -> ca.DM:
         """C: moments of every interval, then values and rates at the nodes between both ends."""
         size = sum(f.numel_out(0) for f, _, _ in self.kept)
-        table, N = self.solution.trajectory.grid.schemes[0], self.method.intervals
-        tests = np.array([legendre.Legendre.basis(j, [0, 1])(table.points) for j in range(MODES)])
-        moment = np.hstack([tests * table.weights, np.zeros((MODES, 1))])
+        table, N = self.problem.grid.schemes[0], self.method.intervals
+        modes = range(table.inner_modes)
+        tests = np.array([legendre.Legendre.basis(j, [0, 1])(table.points) for j in modes])
+        moment = np.hstack([tests * table.weights, np.zeros((len(modes), 1))])
         node = np.append(np.zeros(len(table.points)), 1.0)[None]
         values = np.hstack([np.eye(size), np.zeros((size, size))])
         own = np.vstack([np.kron(moment, values), np.kron(node, np.eye(2 * size))])
@@ -110,10 +123,9 @@ class KeptProgram:
             every[np.setdiff1d(np.arange(every.shape[0]), first + np.arange(2 * size))]
         )
 
-    def solve(self, goal: Array) -> tuple[float, dict[str, Any], float]:
-        """Processor time in [s], Ipopt's statistics and the cost, from the cubic to a goal."""
-        problem, method, program = self.solution.problem, self.method, self.method.program
-        assert problem is not None
+    def solve(self, goal: Array, near: hovi.Trajectory | None = None) -> IpoptSolve:
+        """From the cubic to a goal, or from a motion."""
+        problem, method, program = self.problem, self.method, self.method.program
         value, first, second = self.kernels
         P, n = len(program.weights), method.joints
         w, W = ca.MX.sym("w", program.points.shape[1]), ca.DM(program.weights)
@@ -143,7 +155,8 @@ class KeptProgram:
         )
         solver = ca.nlpsol("S", "ipopt", {"x": w, "f": ca.dot(L.T, W), "g": g[0]}, options)
         ends = np.stack([problem.ends[0][0], goal]), np.zeros((2, n))
-        guess = method.unknowns(cubic(problem.robot, ends, method.duration), ends)
+        first = cubic(problem.robot, ends, method.duration) if near is None else near.jet
+        guess = method.unknowns(first, ends)
         free = np.where(method.fixed[:, None], 0.0, np.inf)
         bounds = {
             "lbx": (guess - free).ravel(),
@@ -152,40 +165,42 @@ class KeptProgram:
             "ubg": 0.0,
         }
         seconds, found = timed(lambda: solver(x0=guess.ravel(), **bounds))
-        return seconds, solver.stats(), float(found["f"])
+        stats = solver.stats()
+        return IpoptSolve(
+            seconds, int(stats["iter_count"]), float(found["f"]), str(stats["return_status"])
+        )
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """hovi's plan and Ipopt's solve of one task."""
+    """One task: hovi's solve on a grid and its plan, and Ipopt's solves on that and a finer grid.
 
-    arm: str
-    kind: str
-    seconds: float
+    seconds: of a solve, and of a plan. cost: of hovi's solve; NaN where one of them is no minimum.
+    """
+
+    seconds: tuple[float, float]
     steps: int
     cost: float
-    ipopt_seconds: float
-    ipopt_steps: int
-    ipopt_cost: float
-    ipopt_status: str
+    ipopt: tuple[IpoptSolve, IpoptSolve]
 
 
 def compare(arm: str, kind: str, count: int, seed: int) -> list[Comparison]:
     """Every task of an arm, to the configuration in which hovi's plan to the place ends."""
     scene, rows = arm_scene(arm), []
-    for number, task in enumerate(random_tasks(scene, kind, count, seed)):
+    for task in random_tasks(scene, kind, count, seed):
         planned = partial(_plan, scene, task, kind)
         there = planned(hovi.FrameGoal(scene.robot.tip_frames[0], position=task.place))
         goal = there.trajectory.q[-1]
-        if number == 0:
-            planned(goal)  # loads everything
-        seconds, found = timed(partial(planned, goal))
+        problem = planned(goal).problem  # also loads everything
+        whole, plan = timed(partial(planned, goal))
+        solve_on_grid(problem)
+        seconds, found = timed(partial(solve_on_grid, problem))
         with tempfile.TemporaryDirectory() as folder:
-            program = KeptProgram(found, Path(folder))
-            theirs, stats, cost = program.solve(goal)
-        status, steps = str(stats["return_status"]), int(stats["iter_count"])
-        own = found.cost if found.success else np.nan
-        rows.append(Comparison(arm, kind, seconds, found.nit, own, theirs, steps, cost, status))
+            program = KeptProgram(problem, Path(folder))
+            finer = KeptProgram(problem.finer, Path(folder), program.kernels)
+            first, second = program.solve(goal), finer.solve(goal, found.trajectory)
+        cost = found.cost if found.success and plan.success else np.nan
+        rows.append(Comparison((seconds, whole), found.nit, cost, (first, second)))
     return rows
 
 
@@ -204,6 +219,10 @@ def _plan(scene: hovi.Scene, task: KeptTask, kind: str, goal: Any) -> hovi.Solut
     )
 
 
+def _succeeded(solve: IpoptSolve) -> bool:
+    return solve.status == "Solve_Succeeded"
+
+
 def main() -> None:
     """Print a row for each arm and kind, and every solve that did not succeed."""
     parser = argparse.ArgumentParser()
@@ -215,9 +234,11 @@ def main() -> None:
     for arm in given.arms or ARMS:
         for kind in ASKED:
             runs = alone(compare, arm, kind, given.count, given.seed)
-            both = [r for r in runs if r.ipopt_status == "Solve_Succeeded" and np.isfinite(r.cost)]
-            gaps = [r.cost / r.ipopt_cost - 1.0 for r in both]
+            both = [r for r in runs if np.isfinite(r.cost) and all(map(_succeeded, r.ipopt))]
+            gaps = [r.cost / r.ipopt[0].cost - 1.0 for r in both]
             same = [abs(gap) for gap in gaps if abs(gap) < 1e-4]
+            solve = [r.ipopt[0].seconds / r.seconds[0] for r in both]
+            plan = [sum(each.seconds for each in r.ipopt) / r.seconds[1] for r in both]
             table.append(
                 [
                     f"`{arm}`, {kind}",
@@ -226,13 +247,15 @@ def main() -> None:
                     middle_and_most(same, ".0e"),
                     f"{sum(gap <= -1e-4 for gap in gaps)}, {sum(gap >= 1e-4 for gap in gaps)}",
                     middle_and_most([r.steps for r in both], ".0f"),
-                    middle_and_most([r.ipopt_steps for r in both], ".0f"),
-                    middle_and_most([r.ipopt_seconds / r.seconds for r in both]),
+                    middle_and_most([r.ipopt[0].steps for r in both], ".0f"),
+                    middle_and_most(solve),
+                    middle_and_most(plan),
                 ]
             )
     columns = ["", "minima: hovi, Ipopt", "the same minimum", "difference of costs: median, max"]
     columns += ["cheaper: hovi, Ipopt", "steps: median, max", "Ipopt's steps"]
-    print_table([*columns, "Ipopt's CPU s / hovi's: median, max"], table)
+    columns += ["a solve: Ipopt's CPU s / hovi's: median, max"]
+    print_table([*columns, "a plan: the same"], table)
     print_machine(threads=1)
 
 

@@ -1,20 +1,23 @@
 """Random tasks that keep a line, a plane, a direction or a speed, within the URDF's limits.
 
 Each has a way by inverse kinematics whose least time, with a fifth in reserve, is shorter than the
-duration (kept_paths.py), and along which the given meshes of links are twice the margin apart:
-links are kept apart by default, as convex hulls. Motions are judged at 20,000 samples by Pinocchio
+duration (kept_paths.py), and along which the given meshes of links are APART apart: links are kept
+apart by default, as convex hulls. Motions are judged at 20,000 samples by Pinocchio
 alone: what is kept, limits on q, v and the torques of pin.rnea, and the integral of 1/2 |tau|^2;
 and, at fewer, the distances of the meshes by Coal. Steps and times of plans are also given relative
 to the plan of the same ends without what is kept.
 
-    python kept_tasks.py [ARM ...] [--count 2] [--seed 0] [--kind WORD]
+    python kept_tasks.py [ARM ...] [--count 2] [--seed 0] [--kind WORD] [--runs FILE]
 """
 
 from __future__ import annotations
 
 import argparse
+import dataclasses
+import json
 from dataclasses import dataclass
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
@@ -31,6 +34,9 @@ Array = npt.NDArray[np.float64]
 
 ARMS = ("ur5", "ur10", "panda", "kinova", "xarm7", "z1")
 SAMPLES = 20_000
+APART = 1.5 * DEFAULT_MARGIN
+"""Least distance of meshes along the way, in [m]: hulls are larger, and a UR10's upper arm is never
+farther than twice the margin from its base."""
 MAX_EXCESS = 1e-6
 """Largest excess over a limit of a motion that holds it, as a fraction of its range."""
 DISTANCE, ANGLE = 1e-5, np.deg2rad(0.01)
@@ -68,7 +74,7 @@ def measure(arm: str, kind: str, count: int, seed: int, time_limit: float) -> li
     rows = []
 
     def apart(way: Array) -> bool:
-        return bool(meshes.distances(way).min() >= 2 * DEFAULT_MARGIN)
+        return bool(meshes.distances(way).min() >= APART)
 
     for number, task in enumerate(random_tasks(scene, kind, count, seed, apart)):
         planned = partial(hovi.plan, scene, task.start, duration=task.duration)
@@ -148,10 +154,17 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--kind", default="", help="only kinds that contain this")
     parser.add_argument("--time-limit", type=float, default=60.0, help="of a plan, in [s]")
+    parser.add_argument("--runs", type=Path, help="a file of runs, which are in the table, too")
     given = parser.parse_args()
+    runs = saved_runs(given.runs)
     kinds = [each for each in KINDS if given.kind in each]
     arms, rest = given.arms or list(ARMS), (given.count, given.seed, given.time_limit)
-    runs = [run for arm in arms for kind in kinds for run in alone(measure, arm, kind, *rest)]
+    for arm in arms:
+        for kind in kinds:
+            if (arm, kind) not in {(r.arm, r.kind) for r in runs}:
+                runs += alone(measure, arm, kind, *rest)
+                save(runs, given.runs)
+    arms = [each for each in ARMS if any(r.arm == each for r in runs)]
     columns = ["", "minima", "wrong", "largest miss [mm], [deg]", "CPU s: median, max", "steps"]
     columns += ["steps / without: median, max", "CPU s / without: median, max"]
     groups = [(kind, [r for r in runs if r.kind == kind]) for kind in kinds]
@@ -164,6 +177,19 @@ def main() -> None:
                 f"- `{run.arm}` {run.number}, {run.kind}: {run.status}, {run.seconds:.2g} s: {said}"
             )
     print_machine(threads=1)
+
+
+def saved_runs(file: Path | None) -> list[Run]:
+    """The runs in a file; none without one."""
+    if file is None or not file.exists():
+        return []
+    return [Run(**json.loads(line)) for line in file.read_text().splitlines()]
+
+
+def save(runs: list[Run], file: Path | None) -> None:
+    """Write runs to a file, if there is one."""
+    if file is not None:
+        file.write_text("".join(f"{json.dumps(dataclasses.asdict(run))}\n" for run in runs))
 
 
 def row(name: str, runs: list[Run]) -> list[str]:

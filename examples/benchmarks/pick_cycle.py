@@ -3,9 +3,9 @@
 A UR5 takes a part of 1 kg and brings it to another place: it reaches a pose 100 mm above the part,
 goes down to it on a straight line with its tool vertical, in the last 50 mm no faster than
 100 mm/s, lifts it 100 mm straight up, carries it, lowers it straight by 50 mm as slowly, and goes
-home. It rests at both ends of each, whose duration is free, at one price per second. The scan is a
-descent along each duration in turn, by plans for given ones, from the geometric means of their
-bounds on, or from what was found.
+home. It passes where the last 50 mm begin and rests at the other ends of segments, whose durations
+are free, at one price per second. The scan is a descent along each duration in turn, by plans for
+given ones, from the geometric means of their bounds on, or from what was found.
 
     python pick_cycle.py [--weight 200] [--finest 1.05] [--around]
 """
@@ -41,15 +41,16 @@ def cycle(durations: Durations) -> list[hovi.Segment]:
     slowly = *straight, hovi.conditions.ToolSpeed("tool0", "100 mm/s")
     part = [hovi.effects.Payload(frame="tool0", mass=1.0, center=(0.0, 0.0, 0.05))]
 
-    def over(place: tuple[float, float], height: float) -> hovi.FrameGoal:
-        return hovi.FrameGoal("tool0", position=[*place, HEIGHT + height], axis=down)
+    def over(place: tuple[float, float], height: float, free: Sequence[str] = ()) -> hovi.FrameGoal:
+        position = [*place, HEIGHT + height]
+        return hovi.FrameGoal("tool0", position=position, axis=down, free_velocity=free)
 
     goals = [
         over(PART, 0.1),
-        over(PART, 0.05),
+        over(PART, 0.05, ["all"]),
         over(PART, 0.0),
         over(PART, 0.1),
-        over(PLACE, 0.05),
+        over(PLACE, 0.05, ["all"]),
         over(PLACE, 0.0),
         list(HOME),
     ]

@@ -17,7 +17,7 @@ import pytest
 import umsgpack
 
 import hovi
-from hovi.errors import InputError, SceneError
+from hovi.errors import HoviWarning, InputError, SceneError
 from hovi.planning.clearance.clearance import Clearance
 from hovi.planning.sequence.branches import MoveToGoal, chosen_branches
 from hovi.planning.sequence.carried import scene_carrying
@@ -384,3 +384,19 @@ def test_inverse_kinematics_sees_what_is_carried_at_a_goal() -> None:
     tip = rod_at(chosen(np.array([5.0, 5.0, 0.0]), before)) * np.array([0.2, 0.0, 0.0])
     assert apart(chosen(tip, before), tip) < 0.0
     assert apart(chosen(tip, carried), tip) >= MARGIN - 1e-6
+
+
+def test_a_goal_at_which_nothing_is_clear_is_named_with_the_pair() -> None:
+    """The crate's bottom would be 5 cm below the top of a table, in every configuration."""
+    q = np.array(at(0.6))
+    pose = arm().robot.frame_pose("tool0", q)
+    bottom = pose[:3, 3] + pose[:3, :3] @ np.array([0.0, 0.0, 0.16])
+    table = hovi.Box([0.2, 0.2, 0.1], bottom, name="table")
+    goal = hovi.FrameGoal("tool0", position=pose[:3, 3], rotation=pose[:3, :3])
+    segments = [
+        hovi.Segment(goal, 1.0, name="lower", grasped=[crate()]),
+        hovi.Segment(at(0.6, -0.3), 1.0, name="away"),
+    ]
+    known = {"obstacles": [table], "self_collision": False, "intervals": 8, "max_iterations": 5}
+    with pytest.warns(HoviWarning, match="'lower' the goal is met.*'crate' and .*'table'"):
+        hovi.plan_sequence(arm(), at(0.6, -0.4), segments, **known)

@@ -564,7 +564,7 @@ def test_every_format_has_a_file_name_of_its_own(run: Run, motion: Path, tmp_pat
         assert str(tmp_path / target) in out
     assert saved.read_bytes() == motion.read_bytes()
     refused = run("export", saved, "--format", "numpy", "--out", saved)
-    assert_refused(refused, "the motion itself")
+    assert_refused(refused, "a motion itself")
 
 
 def test_motions_are_joined_in_one_export(run: Run, tmp_path: Path) -> None:
@@ -577,6 +577,9 @@ def test_motions_are_joined_in_one_export(run: Run, tmp_path: Path) -> None:
     code, said, _ = run("export", there, "--then", back, "--gap", "0.2", "--out", out, *tuned)
     assert (code, said.strip()) == (0, f"wrote {out}")
     program = read_urscript(out.read_bytes())
+    alike = tmp_path / "listed.script"
+    assert run("export", there, back, "--gap", "0.2", alike, *tuned)[0] == 0
+    assert read_urscript(alike.read_bytes()).targets.tolist() == program.targets.tolist()
     assert program.tuning == {(0.05, 500.0)}
     np.testing.assert_allclose(program.times[-2], 1.2, atol=1e-9)
     np.testing.assert_allclose(program.targets[[61, 80]], 0.4, atol=2e-3)
@@ -584,8 +587,11 @@ def test_motions_are_joined_in_one_export(run: Run, tmp_path: Path) -> None:
     assert_refused(again, "motion 2 begins 0.3 rad or m of", "plan it from there")
     assert_refused(run("export", there, "--gap", "1", "--csv"), "a gap is between motions")
     assert_refused(run("export", there, "--gain", "1", "--csv"), "`gain` is for", "'urscript'")
-    assert_refused(run("export", there, "--then", back, "--out", back), "the motion itself")
+    assert_refused(run("export", there, "--then", back, "--out", back), "a motion itself")
     assert not (tmp_path / "no.csv").exists()
+    before = back.read_bytes()
+    assert_refused(run("export", there, back), "a motion itself", "--out to export several")
+    assert back.read_bytes() == before
 
 
 def test_a_motion_is_checked_in_mujoco(run: Run, motion: Path) -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 import hovi
@@ -17,6 +18,7 @@ from samples.small_robots import arm
 MASS, BOUNDS = 0.5, (0.1, 9.0)
 LIMITED = {"base": "none", "v": 2.0, "tau": 8.0}
 GRAVITY = hovi.effects.Gravity()
+UR5_START = [0.3, -1.3, 1.7, -1.97, -1.57, 0.0]
 
 
 def lengths(found: hovi.Solution) -> list[float]:
@@ -74,6 +76,56 @@ def test_no_other_durations_cost_less(asked: str) -> None:
         other = planned(*T, guess=found.trajectory)
         cost = other.cost + weight * sum(T) if other.success else np.inf
         assert cost > found.cost * (1 + 1e-5)
+
+
+def test_a_line_that_is_passed_at_a_speed_lasts_as_long_as_is_best() -> None:
+    """Down on a line, slowly in its last part: no other durations cost less."""
+    scene, start = (
+        hovi.Scene(hovi.load_robot("ur5"), [GRAVITY]),
+        [0.3, -1.3, 1.7, -1.97, -1.57, 0.0],
+    )
+    x, y, z = scene.robot.frame_pose("tool0", start)[:3, 3]
+    line, slow = hovi.conditions.OnLine("tool0"), hovi.conditions.ToolSpeed("tool0", "250 mm/s")
+    down = hovi.FrameGoal("tool0", position=[x, y, z - 0.1], free_velocity=["all"])
+    there, weight = hovi.FrameGoal("tool0", position=[x, y, z - 0.15]), 200.0
+
+    def planned(first: Any, last: Any, **more: Any) -> hovi.Solution:
+        segments = [
+            hovi.Segment(down, first, keep=[line]),
+            hovi.Segment(there, last, keep=[line, slow]),
+        ]
+        return hovi.plan_sequence(scene, start, segments, self_collision=False, **more)
+
+    found = planned((0.1, 2.0), (0.1, 2.0), time_weight=weight)
+    assert found.success, found.message
+    best = np.array(lengths(found))
+    seam = found.trajectory.sample(best[:1])
+    J = pin.computeFrameJacobian(
+        scene.robot.model.copy(),
+        scene.robot.model.createData(),
+        seam.q[0],
+        scene.robot.model.getFrameId("tool0"),
+        pin.ReferenceFrame.LOCAL_WORLD_ALIGNED,
+    )
+    speed = np.linalg.norm((J @ seam.v[0])[:3])
+    assert 0.1 < speed < 0.25 * (1 + 1e-5)
+    for change in ((0.92, 1.0), (1.08, 1.0), (1.0, 0.92), (1.0, 1.08)):
+        T = best * change
+        other = planned(*T.tolist(), guess=found.trajectory)
+        cost = other.cost + weight * T.sum() if other.success else np.inf
+        assert cost > found.cost * (1 + 1e-5)
+
+
+def test_a_segment_whose_start_does_not_say_what_is_kept_is_named() -> None:
+    scene, start = (
+        hovi.Scene(hovi.load_robot("ur5"), [GRAVITY]),
+        [0.3, -1.3, 1.7, -1.97, -1.57, 0.0],
+    )
+    goal = hovi.FrameGoal("tool0", position=scene.robot.frame_pose("tool0", start)[:3, 3])
+    upright = [hovi.conditions.Upright("tool0")]
+    segments = [hovi.Segment(goal, 1.0), hovi.Segment(start, 1.0, name="back", keep=upright)]
+    with pytest.raises(InputError, match=r"in 'back', keep 'upright tool0' needs its `axis`"):
+        hovi.plan_sequence(scene, start, segments)
 
 
 def test_segments_that_are_too_short_in_the_mean_are_planned_from_the_longest() -> None:

@@ -576,3 +576,17 @@ def test_a_pick_that_would_fold_into_itself_keeps_its_distances(slower: float) -
     distances = found.problem.distances
     q = found.trajectory.configurations(np.linspace(0.0, total, 5001))
     assert distances.values(q, 0.05).min() > 0.01
+
+
+def test_a_joint_may_stop_at_its_limit_between_segments() -> None:
+    """As costly as plans of each segment alone, whose ends are at the limit."""
+    limits = {"base": "none", "q": [[-3.0, 3.0], [-GRAB[1], GRAB[1]]]}
+    options = {"limits": limits, "self_collision": False}
+    moves = [(GRAB, 0.5), (GRAB, 0.3), ([0.0, 0.0], 0.8)]
+    found = hovi.plan_sequence(scene(), [0.0, 0.0], [Segment(*each) for each in moves], **options)
+    assert found.success, found.message
+    starts = [[0.0, 0.0], GRAB, GRAB]
+    alone = [hovi.plan(scene(), q, *each, **options) for q, each in zip(starts, moves, strict=True)]
+    assert found.cost == pytest.approx(sum(each.cost for each in alone), rel=2e-3)
+    elbow = found.trajectory.sample(np.linspace(0.0, 1.6, 5001)).q[:, 1]
+    assert GRAB[1] - 1e-6 < elbow.max() < GRAB[1] + 1e-5

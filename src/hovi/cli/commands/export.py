@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -14,10 +15,13 @@ if TYPE_CHECKING:
 
 
 def export(
-    file: Annotated[Path, typer.Argument(metavar="FILE.npz", help="A motion.")],
-    positional: Annotated[
-        Path | None, typer.Argument(metavar="OUT", help="Short for --out.")
-    ] = None,
+    paths: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="FILE.npz",
+            help="A motion, or several as one; without --out, the last of two or more is OUT.",
+        ),
+    ],
     format_: Annotated[
         str | None,
         typer.Option("--format", metavar="NAME", help="Such as csv; default: by the name of OUT."),
@@ -34,7 +38,10 @@ def export(
     ] = None,
     then: Annotated[
         list[Path] | None,
-        typer.Option(metavar="FILE.npz", help="A motion that follows; may be repeated."),
+        typer.Option(
+            metavar="FILE.npz",
+            help="A motion that follows; may be repeated.",
+        ),
     ] = None,
     gap: Annotated[
         float, typer.Option(help="Seconds for which the robot rests between motions.")
@@ -66,11 +73,11 @@ def export(
     from hovi.cli.arguments.files import check_output, load_shown
     from hovi.exchange.formats import export as write
 
-    given, files = _output(positional, out), [file, *(then or [])]
+    first, given = _motions_and_output(paths, out)
+    files = [*first, *(then or [])]
     chosen = _format(format_, csv, given)
-    target = check_output(given or _beside(file, chosen), *chosen.suffixes)
-    for each in files:
-        _require_other_file(target, each)
+    target = check_output(given or _beside(files[0], chosen), *chosen.suffixes)
+    _require_no_motion(target)
     motions = [load_shown(each, package_dir) for each in files]
     options: dict[str, Any] = {"lookahead_time": lookahead_time, "gain": gain}
     options |= {"size": size, "camera": camera, "speed": speed}
@@ -103,18 +110,29 @@ def _beside(file: Path, chosen: ExportFormat) -> Path:
     return file.with_name(f"{file.stem}_samples{chosen.suffix}") if other == file else other
 
 
-def _require_other_file(target: Path, file: Path) -> None:
+def _require_no_motion(target: Path) -> None:
+    """Raise InputError where a motion would be overwritten, such as the last of several."""
+    from hovi.cli.arguments.files import load_trajectory
+    from hovi.errors import HoviError, InputError
+
+    try:
+        load_trajectory(target)
+    except HoviError:
+        return
+    raise InputError(
+        f"{str(target)!r} is a motion itself; choose another output file, with --out to export "
+        "several motions as one."
+    )
+
+
+def _motions_and_output(paths: Sequence[Path], out: Path | None) -> tuple[list[Path], Path | None]:
+    """The motions and the output file: --out, or the last of several paths; None without one."""
     from hovi.errors import InputError
 
-    if target.exists() and file.exists() and target.samefile(file):
-        raise InputError(f"{str(target)!r} is the motion itself; choose another output file.")
-
-
-def _output(positional: Path | None, out: Path | None) -> Path | None:
-    from hovi.errors import InputError
-
-    if positional is not None and out is not None:
+    if out is None:
+        return ([*paths[:-1]], paths[-1]) if len(paths) > 1 else ([*paths], None)
+    if len(paths) > 1 and paths[-1].suffix != ".npz":
         raise InputError(
-            f"two output files were given; use {str(positional)!r} or --out {str(out)!r}."
+            f"two output files were given; use {str(paths[-1])!r} or --out {str(out)!r}."
         )
-    return positional or out
+    return [*paths], out

@@ -49,6 +49,10 @@ class InverseKinematicsResult:
     reason: str = ""
 
 
+class NotClearError(UnreachableError):
+    """Configurations reach a goal, but none that was found keeps its distances."""
+
+
 @check_arguments_except("robot", "goal", "near", "limits", "obstacles", "margin", "most", "seeds")
 def inverse_kinematics(
     robot: Robot,
@@ -191,7 +195,7 @@ def _kept_clearance(obstacles: tuple[Obstacle, ...], margin: float, both: bool) 
 def _clear(q: Array, distances: Distances, margin: float) -> Array:
     """The configurations that keep the margin. distances: of all that stands still.
 
-    Raises UnreachableError if none does.
+    Raises NotClearError if none does.
     """
     if not distances.pairs:
         return q
@@ -202,7 +206,7 @@ def _clear(q: Array, distances: Distances, margin: float) -> Array:
     best = int(np.argmax(d.min(axis=1)))
     pair = int(np.argmin(d[best]))
     distance = float(d[best, pair] - distances.allowance[pair])
-    raise UnreachableError(
+    raise NotClearError(
         f"the goal is met by {len(q)} configurations that were found, but all of them come closer "
         f"to obstacles or links than {margin:g} m: in the best one {distances.pairs[pair]} "
         f"{distance_in_words(distance)}; move the goal or the obstacle, reduce the margin, or give "

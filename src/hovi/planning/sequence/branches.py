@@ -15,10 +15,14 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.discrete.state import State
-from hovi.errors import UnreachableError
+from hovi.errors import UnreachableError, warn
 from hovi.planning.clearance.clearance import Clearance
 from hovi.planning.problem.frame_goal import FrameGoal
-from hovi.planning.problem.inverse_kinematics import configurations, first_configuration
+from hovi.planning.problem.inverse_kinematics import (
+    NotClearError,
+    configurations,
+    first_configuration,
+)
 from hovi.planning.problem.kinematics.cubic_costs import cubic_costs
 from hovi.planning.problem.limits import Range
 from hovi.robot.robot import Robot
@@ -39,6 +43,7 @@ class MoveToGoal:
     """The motion of a sequence from one goal to the next, over one segment or several.
 
     numbers: of its segments, from 0. begin, end: in [s]. goal: at its end. bounds: of q there.
+    name: of the segment that ends there, in messages.
     """
 
     numbers: tuple[int, ...]
@@ -46,6 +51,7 @@ class MoveToGoal:
     end: float
     goal: End
     bounds: Range
+    name: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +77,7 @@ def chosen_branches(
     """The start as a state, and the goals with the branch in which each is reached as their guess.
 
     lagrangian: of the whole sequence. start: whose goal the start is.
-    Goals that cannot be reached stay as they are.
+    Goals that cannot be reached stay as they are, with a warning where that is for a distance.
     Raises UnreachableError for a start that cannot be reached.
     """
     for each in (start, *moves):
@@ -101,7 +107,9 @@ def _next_layer(
     """The branches of a move's goal, with the least cost at which each is reached."""
     try:
         q, known = _branches(robot, move, last.q[0], clearance), True
-    except UnreachableError:
+    except UnreachableError as error:
+        if isinstance(error, NotClearError):
+            warn(f"in {move.name!r} {error}")
         q, known = last.q[:1], False
     K, M = len(last.q), len(q)
     pairs = np.repeat(last.q, M, axis=0), np.tile(q, (K, 1))

@@ -17,6 +17,7 @@ from hovi.conditions.condition import Condition
 from hovi.conditions.kept.keep import Keep
 from hovi.conditions.kept.kinds import as_kept
 from hovi.discrete.state import State
+from hovi.errors import InputError
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.kept_conditions import conditions_kept, goal_kept, kept_between
 from hovi.planning.sequence.branches import End, MoveToGoal
@@ -65,7 +66,11 @@ def kept_in_segments(
         for number in move.numbers:
             first, last = number == move.numbers[0], number == move.numbers[-1]
             own = as_kept(segments[number].keep)
-            kept = kept_between(own, robot, before if first else None, goal if last else None)
+            ends = before if first else None, goal if last else None
+            try:
+                kept = kept_between(own, robot, *ends)
+            except InputError as wrong:
+                raise InputError(f"in {names[number]!r}, {wrong}") from None
             start = before if number == 0 else None
             length = starts[number + 1] - starts[number]
             part = starts[number], starts[number + 1]

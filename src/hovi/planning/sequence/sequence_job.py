@@ -55,7 +55,7 @@ def job_of(
         options = options.carrying(parts_of_carried(segments, ends))
     grid = sequence_grid(segments, options, scene.order)
     first = Job(scene, grid, State(()), State(()), options, job_segments)
-    moves = _moves(goals, ends, limits)
+    moves = _moves(goals, ends, limits, names_of(segments))
     begin = MoveToGoal((), 0.0, 0.0, start, (limits[0].lower[0], limits[0].upper[0]))
     known, reached = chosen_branches(
         scene.robot, first.lagrangian(), begin, moves, options.clearance
@@ -149,7 +149,10 @@ def _distributed(total: int, weights: Array, least: int) -> npt.NDArray[np.intp]
 
 
 def _moves(
-    goals: Sequence[End | None], ends: Sequence[float], limits: Sequence[Limits]
+    goals: Sequence[End | None],
+    ends: Sequence[float],
+    limits: Sequence[Limits],
+    names: Sequence[str],
 ) -> list[MoveToGoal]:
     """From goal to goal; a goal has to be within the limits of the segments before and after it."""
     moves: list[MoveToGoal] = []
@@ -160,6 +163,7 @@ def _moves(
         both = limits[i : i + 2]
         lower = np.max([each.lower[0] for each in both], axis=0)
         upper = np.min([each.upper[0] for each in both], axis=0)
-        moves.append(MoveToGoal(tuple(range(first, i + 1)), begin, end, goal, (lower, upper)))
+        numbers = tuple(range(first, i + 1))
+        moves.append(MoveToGoal(numbers, begin, end, goal, (lower, upper), names[i]))
         first, begin = i + 1, end
     return moves

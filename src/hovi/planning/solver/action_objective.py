@@ -228,6 +228,17 @@ class ActionObjective(Objective[DiscretePath]):
             self.equations.add_at_nodes(x, multipliers.conditions, self._expansion)
         return self.model_of_expansion()
 
+    def without_nodes(self, x: DiscretePath) -> Expansion:
+        """The last expansion, at x, without the terms of equations at nodes."""
+        every, known = self.expansion, self.multipliers
+        if known is None or not self.equations.at_nodes:
+            return every
+        none = np.zeros_like(every.gradient), np.zeros_like(every.hessian)
+        nodes = dataclasses.replace(every, gradient=none[0], hessian=none[1])
+        self.equations.add_at_nodes(x, known.conditions, nodes)
+        left = every.gradient - nodes.gradient, every.hessian - nodes.hessian
+        return dataclasses.replace(every, gradient=left[0], hessian=left[1])
+
     def model_of_expansion(self) -> QuadraticModel:
         """The model of the last expansion, to which more may have been added since."""
         intervals = IntervalSum(

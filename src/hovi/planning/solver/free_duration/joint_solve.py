@@ -62,7 +62,7 @@ def solves_jointly(problem: TrajectoryProblem, clock: Clock, lengths: Array, nea
     asked = [each for each in equations if not isinstance(each.y, Rows)]  # those along come next
     if not all(_stays(each, problem.grid, nodes) for each in asked):
         return False
-    if problem.along and not _scales(problem, nodes):
+    if any(each.where.level > 0 or each.timed for each in problem.along):
         return False
     if distances is not None and (distances.timed or problem.ld.chart is not None):
         return False
@@ -75,24 +75,6 @@ def _stays(equation: Equation, grid: Grid, nodes: Index) -> bool:
     inside = ((nodes[:, 0] < node) & (node < nodes[:, 1])).any()
     moves = node in (0, grid.intervals) and node in nodes  # velocities there change with L
     return not inside and not (moves and equation.y.needs - {"q"})
-
-
-def _scales(problem: TrajectoryProblem, nodes: Index) -> bool:
-    """Whether equations along a motion do not change with lengths of parts, (p, 2) nodes.
-
-    Those of positions do not while the columns (q, h v, ...) of the intervals are kept, which they
-    are where a motion rests at both ends of each part.
-    """
-    if any(each.where.level > 0 or each.timed for each in problem.along):
-        return False
-    N, rests = problem.grid.intervals, set[int]()
-    for hold in problem.holds:
-        if hold.fixed[1].all() and not hold.v.any():
-            rests.add(hold.node)
-    for end, node in enumerate((0, N)):
-        if not problem.free_ends[end, 1].any() and not problem.ends[1][end].any():
-            rests.add(node)
-    return set(nodes.ravel().tolist()) <= rests
 
 
 def solve_jointly(

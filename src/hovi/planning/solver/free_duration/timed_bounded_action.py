@@ -139,7 +139,8 @@ class TimedBoundedAction(Program[TimedPath]):
         assert isinstance(model, TimedModel)
         columns = self._last.pull(self.fraction(model.x.lengths) * forces, model.inner)
         slopes = self.bounds.weights * forces * self._rates
-        return np.append(columns, np.bincount(self._parts + 1, slopes, len(self.lengths) + 1)[1:])
+        of_parts = np.bincount(self._parts + 1, slopes, len(self.lengths) + 1)[1:]
+        return model.in_unknowns(columns, of_parts.astype(np.float64))
 
     def accept(self, step: Array, model: QuadraticModel) -> None:
         """Use the outputs that the step predicts as weights of the next model's curvature."""

@@ -1,4 +1,9 @@
-"""The quadratic model of a discrete action plus the price of time, in the path and log L."""
+"""The quadratic model of a discrete action plus the price of time, in the path and log L.
+
+Where columns of what is kept change with L, the moments of equations along the motion do, too, by
+G = A u for those columns u and the Jacobian A of the equations. Steps in log L alone take that back
+by -E, the least step with A E = G, so that equations do not depend on log L.
+"""
 
 from __future__ import annotations
 
@@ -35,7 +40,8 @@ class TimedModel(BorderedModel):
     forces: of limits at the points, per batch; none if None. rows: of limits between them.
     parts: the part of every interval, -1 for none, (N,). kept: columns that change with log L of
     their part, to first order, (N, m, n). unknown: see `kept_columns`. stretches: the changes of
-    the jets at the points, per batch.
+    the jets at the points, per batch. back: E, by which a step in log L moves the path back so that
+    equations hold, (size, p).
     """
 
     def __init__(
@@ -64,17 +70,42 @@ class TimedModel(BorderedModel):
             known = rows.added_to(known)
         self.kept, self.unknown = kept_columns(problem, x.path, price.clock, x.lengths)
         if self.kept.any() or self.unknown.any():
-            known = known.with_ends(self.expansion, self.kept, self.unknown, problem.ld.k)
+            at_points = action.without_nodes(x.path)
+            known = known.with_ends(at_points, self.kept, self.unknown, problem.ld.k)
         cost, own = price.weight * x.lengths, np.arange(len(x.lengths)) == self.parts[:, None]
-        columns = [inner.scatter(known.column * of[:, None, None]) for of in own.T]
-        border = Border(
-            known.slope @ own + cost,
-            np.stack(columns, axis=1),
-            np.diag(known.corner @ own + cost),
-            metric,
-            price.room(x.lengths),
-        )
-        super().__init__(inner, border)
+        parts = own.T[:, :, None, None]
+        columns = np.stack([inner.scatter(known.column * of) for of in parts], axis=1)
+        slope, corner = known.slope @ own + cost, np.diag(known.corner @ own + cost)
+        self.back = self._back_of(inner, parts)
+        if self.back.any():
+            bent = np.stack([hessian_product(inner, step) for step in self.back.T], axis=1)
+            slope = slope - self.back.T @ inner.gradient
+            corner = corner - columns.T @ self.back - self.back.T @ (columns - bent)
+            columns = columns - bent
+        super().__init__(inner, Border(slope, columns, corner, metric, price.room(x.lengths)))
+
+    def _back_of(self, inner: BandModel | EquationModel, parts: Array) -> Array:
+        """`back`, from which intervals belong to each part, (p, N, 1, 1)."""
+        back = np.zeros((len(inner.gradient), len(parts)))
+        equations = self.action.equations
+        if not isinstance(inner, EquationModel) or not self.kept.any() or not equations.along:
+            return back
+        kkt = inner.kkt
+        at_nodes = sum(each.size for each in equations.at_nodes)  # do not change with L
+        factor, force = kkt.normal_factor(kkt.curvature_scale), np.zeros(len(back))
+        for part, of in enumerate(parts):
+            change = kkt.pushed_columns(self.kept * of)
+            change[len(change) - at_nodes :] = 0.0
+            back[:, part] = factor.solve(force, change)[0]
+        return back
+
+    def gather(self, s: Array) -> Array:
+        """The columns of every interval in the other unknowns, moved back: see the module."""
+        return self.inner.gather(s[: self.size] - self.back @ s[self.size :])
+
+    def in_unknowns(self, columns: Array, slopes: Array) -> Array:
+        """The gradient in all unknowns, from those in the path and in log L alone."""
+        return np.append(columns, slopes - self.back.T @ columns)
 
     def stretch(self, step: Array) -> Array:
         """The change of log L of the part of every interval in a step, 0 without, (N,)."""
@@ -94,6 +125,13 @@ class TimedModel(BorderedModel):
             self.action.ld.lagrangians, self.expansion.outputs, self.point_steps(step), strict=True
         )
         return [L.predicted_slope(y, J, dx) for L, (y, J), dx in parts]
+
+
+def hessian_product(model: BandModel | EquationModel, step: Array) -> Array:
+    """H s of a model, without its equations."""
+    intervals = model.inner.intervals if isinstance(model, EquationModel) else model.intervals
+    bent = np.einsum("kabij,kbj->kai", intervals.hessian, model.gather(step))
+    return model.scatter(bent)
 
 
 def moved_in_time(

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import copy
 import dataclasses
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -25,6 +26,7 @@ from hovi.discrete.interval_batch import Coordinates
 from hovi.discrete.interval_paths import scaled_data
 from hovi.optimize.program import Refinement
 from hovi.planning.problem.limits import Limits
+from hovi.planning.problem.seams import Hold
 from hovi.planning.problem.way_back.excused import Excused
 from hovi.planning.solver.limits.graded_parts import graded
 from hovi.planning.solver.limits.limited_coordinates import LimitedCoordinates
@@ -64,11 +66,13 @@ class LimitRows:
 
     grid: on which they are. limits: imposed. space: of the configurations; None for a vector space.
     free_ends: which of (q, q', ..., q^(k-1)) are free at the start and at the goal, (2, k, nv); all
-        are given if None. A control point that is given with an end has no row.
+        are given if None. holds: what is fixed at nodes between them. A control point that is given
+        with a node has no row, so that a joint may be at its limit there.
     halvings: of all intervals for the control points of positions, and for those of derivatives.
     barrier: the last barrier parameter, relative to the mean density of the cost.
     ends: next to which parts are short enough for what is given there; None where it is not known.
 
+    free: which of (q, q', ..., q^(k-1)) are free at every node, (N + 1, k, nv).
     bounds: lower and upper ones of the E rows, (E,) each. weights: of the rows in a barrier, (E,),
     in [s]. at_nodes: cache of `forces_of`.
     """
@@ -86,11 +90,16 @@ class LimitRows:
         free_ends: Mask | None = None,
         halvings: tuple[int, int] = (0, 0),
         barrier: float = 0.0,
+        holds: Sequence[Hold] = (),
     ) -> None:
         self.grid = grid
         self.space = space
-        shape = 2, grid.order, limits.lower.shape[1]
-        self.free_ends = np.zeros(shape, dtype=bool) if free_ends is None else free_ends
+        shape = grid.intervals + 1, grid.order, limits.lower.shape[1]
+        self.free = np.ones(shape, dtype=bool)
+        self.free[[0, -1]] = False if free_ends is None else free_ends
+        for each in holds:
+            self.free[each.node, :2] = ~each.fixed
+            self.free[each.node, 2:] = each.higher is None
         self.limits = limits
         self.fixed = False
         self._instants: tuple[Grid, Instants] | None = None
@@ -139,6 +148,7 @@ class LimitRows:
         rows.limits = dataclasses.replace(later, excused=())  # in time of the whole motion
         rows.of = LimitedCoordinates.of(rows.limits, grid, self.space)
         rows.grid, rows.parts = grid, dataclasses.replace(left, k=left.k - first)
+        rows.free = np.concatenate([self.free[:1], self.free[first + 1 :]])
         rows._set(rows._rows_of(rows.parts))
         now, before = rows._places_from(first), self._places
         if grid.inner_modes != self.grid.inner_modes or rows.size == 0:
@@ -180,6 +190,11 @@ class LimitRows:
             k = np.repeat(np.arange(grid.intervals), len(nodes))
             self._instants = grid, Instants(k, np.tile(nodes, grid.intervals), weights)
         return self._instants[1]
+
+    @property
+    def free_ends(self) -> Mask:
+        """Which of (q, q', ..., q^(k-1)) are free at the start and at the goal, (2, k, nv)."""
+        return self.free[[0, -1]]
 
     @property
     def size(self) -> int:
@@ -313,16 +328,15 @@ class LimitRows:
         limits than the one before to both.
         """
         degree = control_degree(self.grid.order, self.grid.inner_modes, order)
-        # the derivatives from this one on that are given at an end determine as many points there
-        given = np.cumprod(~self.free_ends[:, order:], axis=1).sum(axis=1)  # (2, nv)
-        at_end = given[:, self.of.joint[parts.coordinate]]
-        at_start = (parts.k == 0) & (parts.left == 0)
+        # the derivatives from this one on that are given at a node determine as many points there
+        given = np.cumprod(~self.free[:, order:], axis=1).sum(axis=1)  # (N + 1, nv)
+        joint, begins, ends = self.of.joint[parts.coordinate], parts.left == 0, parts.k + 1
         smooth = order < self.grid.order
         at_node = np.where(self.of.differ(parts.k, parts.coordinate), 0, int(smooth))
-        before = np.where(at_start, 0, np.where(parts.left > 0, min(degree, 1), at_node))
-        first = np.where(at_start, at_end[0], before)
-        at_goal = (parts.k == self.grid.intervals - 1) & (parts.left + parts.width == 1)
-        last = degree - np.where(at_goal, at_end[1], 0)
+        at_node = np.where(parts.k == 0, 0, at_node)
+        known = np.maximum(given[parts.k, joint], at_node)
+        first = np.where(begins, known, min(degree, 1))
+        last = degree - np.where(parts.left + parts.width == 1, given[ends, joint], 0)
         i = np.arange(degree + 1)
         return np.asarray((i >= first[:, None]) & (i <= last[:, None]))
 
