@@ -24,6 +24,8 @@ LARGEST_MARGIN = 0.05
 """Largest margin, as a fraction of the range; where more is exceeded, intervals are halved."""
 UNUSED = 10.0
 """Unused margin, in tolerances, from which it is relaxed."""
+STEEPEST = 10.0
+"""Largest decrease of a wanted margin per increase of a margin that is extrapolated."""
 NEXT_LEVEL = 0.3
 """Barrier parameter, relative to the one before, at which every margin may be relaxed again."""
 
@@ -51,6 +53,7 @@ class MarginsBetweenPoints:
         """Begin another solve, in which margins may be relaxed."""
         self._level = np.inf
         self._relaxed = self._firm = np.zeros(self.values.shape, dtype=bool)
+        self._last: tuple[Array, Array] | None = None
 
     def follow(
         self, problem: TrajectoryProblem, path: DiscretePath, at_points: Array, level: float
@@ -77,6 +80,12 @@ class MarginsBetweenPoints:
         if not (exceeded | relaxed).any():
             return False
         self._relaxed = self._relaxed | relaxed
-        half = 0.5 * (self.values + wanted)
-        self.values = np.where(relaxed, half, np.maximum(self.values, wanted))
+        slope, last = np.zeros(wanted.shape), self._last
+        if last is not None:
+            change = self.values - last[0]
+            np.divide(wanted - last[1], change, out=slope, where=np.abs(change) > self.tolerance)
+        slope = np.clip(slope, -STEEPEST, 0.0)
+        self._last = self.values, wanted
+        found = (wanted - slope * self.values) / (1.0 - slope)
+        self.values = np.where(relaxed, found, np.maximum(self.values, found))
         return True
