@@ -176,6 +176,11 @@ class Barrier:
             z[old:][known] = np.maximum(z[old:][known], former[origin[known]])
         return whole._clipped()
 
+    def within(self, bounds: Bounds) -> Barrier:
+        """The same within other bounds of the same outputs, with which slacks have moved."""
+        s = self.s + self._moved_with(bounds, np.arange(len(self.s)))
+        return dataclasses.replace(self, bounds=bounds, s=s)._clipped()
+
     def _moved_inside(self, change: Array, kept: Index) -> Array:
         """The change of outputs that have one bound and move away from it; 0 of others."""
         bounds = self.bounds

@@ -81,18 +81,21 @@ class _Newton(Generic[X]):
     ) -> None:
         self.objective, self.ended = objective, ended
         self.criteria, self.report = criteria, report
-        outputs, bounds = ended.outputs, objective.bounds.shrunk(ROOM)
-        known = dataclasses.replace(ended.z, bounds=bounds)
-        self.density = abs(outputs.value) / objective.bounds.measure
+        self.density = abs(ended.value) / objective.bounds.measure
         self.last_mu = criteria.barrier * self.density
         self.weight = GAP_WEIGHT * self.density
-        outside = float(known.outside(outputs.y).max(initial=0.0))
-        apart = float(np.max(np.abs(outputs.y - known.s), initial=0.0))
+        self._begin(dataclasses.replace(ended.z, bounds=objective.bounds.shrunk(ROOM)))
+        ended.keep_best(objective.bounds)
+
+    def _begin(self, known: Barrier) -> None:
+        """Begin with slacks and multipliers that are nearly those of the solution."""
+        ended = self.ended
+        outside = float(known.outside(ended.outputs.y).max(initial=0.0))
+        apart = float(np.max(np.abs(ended.outputs.y - known.s), initial=0.0))
         self.farthest = LARGEST_GROWTH * max(outside, LEAST_OUTSIDE, apart)
         mu = min(FIRST_MU * outside**2, LARGEST_FIRST_MU) * self.density
         ended.z = known.recentered(self.weight, max(self.last_mu, mu))
         self.outside, self.work = 0.0, math.inf
-        ended.keep_best(objective.bounds)
 
     def run(self) -> None:
         """Iterate until stationary, or until it does not converge."""
@@ -106,6 +109,8 @@ class _Newton(Generic[X]):
                 return
             step, slope, length = model.descend(factor)
             if self._is_solved(-0.5 * slope):
+                if self._tightened():
+                    continue
                 ended.z = ended.z.at_outputs(self.objective.bounds, ended.outputs.y)
                 ended.model, ended.why = model, Reason.STATIONARY
                 ended.saved.append((ended.z.mu, ended.x))
@@ -113,6 +118,14 @@ class _Newton(Generic[X]):
             if len(ended.steps) >= self.criteria.max_iterations:
                 return
             self._take(step, -0.5 * slope, math.sqrt(max(length, 0.0)), model)
+
+    def _tightened(self) -> bool:
+        """Whether bounds changed for what the motion violates that outputs do not show."""
+        ended, objective = self.ended, self.objective
+        if not objective.tighten(ended.x, ended.z.mu / self.density):
+            return False
+        self._begin(ended.z.within(objective.bounds.shrunk(ROOM)))
+        return True
 
     def _take(self, step: Array, decrease: float, norm: float, model: QuadraticModel) -> None:
         """Take a Newton step, which predicts a decrease."""

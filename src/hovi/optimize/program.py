@@ -120,6 +120,13 @@ class Program(ABC, Generic[X]):
         """
         return None
 
+    def tighten(self, x: X, level: float) -> bool:
+        """Change bounds for what x violates that outputs do not show; whether any changed.
+
+        level: barrier parameter at x, relative to the mean density of the objective.
+        """
+        return False
+
     def refine_at_once(self, x: X) -> Refinement | None:
         """The same after any step, for outputs that cannot wait for a smaller product."""
         return None

@@ -434,8 +434,14 @@ class BoundedAction(Program[DiscretePath]):
         kept = np.append(np.arange(first), first + of_rows.kept)
         return Refinement(kept, np.where(of_rows.origin < 0, -1, first + of_rows.origin))
 
+    def tighten(self, x: DiscretePath, level: float) -> bool:
+        """See Program: bounds at the points, for what the motion exceeds between them."""
+        tighter = self._tightened(x, level)
+        if tighter:
+            self._with_rows()
+        return tighter
+
     def _tightened(self, x: DiscretePath, level: float) -> bool:
-        """Whether bounds at the points are others for what the motion exceeds between them."""
         if self.between is None or self._point_count == 0:
             return False
         if not self.between.follow(self.problem, x, self._excess_at_points(x), level):
