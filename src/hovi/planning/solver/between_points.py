@@ -50,10 +50,14 @@ class MarginsBetweenPoints:
         self.begin()
 
     def begin(self) -> None:
-        """Begin another solve, in which margins may be relaxed."""
-        self._level = np.inf
-        self._relaxed = self._firm = np.zeros(self.values.shape, dtype=bool)
+        """Begin another solve."""
         self._last: tuple[Array, Array] | None = None
+        self._at_level(np.inf)
+
+    def _at_level(self, level: float) -> None:
+        """Let margins be relaxed at a barrier parameter."""
+        self._level = level
+        self._relaxed = self._firm = np.zeros(self.values.shape, dtype=bool)
 
     def follow(
         self, problem: TrajectoryProblem, path: DiscretePath, at_points: Array, level: float
@@ -72,8 +76,7 @@ class MarginsBetweenPoints:
         more = np.clip(beyond + 0.5 * self.tolerance, 0.0, LARGEST_MARGIN)
         wanted = np.where(held, more, 0.0)
         if level <= NEXT_LEVEL * self._level:
-            self.begin()
-            self._level = level
+            self._at_level(level)
         exceeded = (between > self.tolerance) & (wanted > self.values)
         self._firm = self._firm | (self._relaxed & exceeded)
         relaxed = (wanted < self.values - UNUSED * self.tolerance) & ~self._firm
