@@ -771,35 +771,29 @@ _rule(
     "not long.any()",
     "True",
 )
-_at("limits", "planning.solver.methods.limits_between_points")
+_at("limits", "planning.solver.between_points")
 _rule(
-    "tighten bounds",
-    "Torques beyond a bound between the points get tighter bounds before intervals are halved.",
-    "tightened",
-    "excess > HALVING_EXCESS or (finer and on_grid > MAX_ROUNDS_PER_GRID)",
+    "margins follow",
+    "Bounds at points are tightened for what a motion exceeds between them while it is sought.",
+    "follow",
+    "not near.any()",
     "True",
 )
 _rule(
-    "loosen unused bounds",
-    "A tightened bound that is not used is relaxed.",
-    "_solved_tighter",
-    "np.isfinite(sides) & (sides < -UNUSED_MARGIN)",
-    "np.isfinite(sides) & False",
+    "unused margins",
+    "A margin that is not used is relaxed, once at each barrier parameter.",
+    "follow",
+    "& ~self._firm",
+    "& False",
 )
 _rule(
-    "warm where tightened",
-    "A solve with tighter bounds begins with the last slacks and multipliers.",
-    "_solved_tighter",
-    "len(y) == len(barrier.s)",
-    "False",
+    "margins by secants",
+    "A margin changes as its last two values extrapolate, not by the whole excess.",
+    "follow",
+    "-STEEPEST, 0.0",
+    "0.0, 0.0",
 )
-_rule(
-    "few steps where the duration moves",
-    "With a free duration such a solve has at most 25 steps.",
-    "_solved_tighter",
-    "search.free_duration",
-    "False",
-)
+_at("limits", "planning.solver.methods.limits_between_points")
 _rule(
     "neighbours are halved, too",
     "Intervals next to one that is halved are halved.",

@@ -22,7 +22,7 @@ Array = npt.NDArray[np.float64]
 
 LARGEST_MARGIN = 0.05
 """Largest margin, as a fraction of the range; where more is exceeded, intervals are halved."""
-UNUSED = 10.0
+UNUSED = 5.0
 """Unused margin, in tolerances, from which it is relaxed."""
 STEEPEST = 10.0
 """Largest decrease of a wanted margin per increase of a margin that is extrapolated."""
