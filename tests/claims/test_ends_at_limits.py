@@ -304,3 +304,41 @@ def test_a_start_that_is_led_back_costs_what_a_fine_grid_says(speed: float, goal
         return hovi.plan(hovi.Scene(robot, []), start, end, 2.2, limits=limits, **options).cost
 
     assert cost() == pytest.approx(cost(intervals=160), rel=1e-3)
+
+
+@pytest.mark.parametrize("robot", ROBOTS)
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+@pytest.mark.parametrize("given", ["a velocity", "a configuration", "a segment", "a free segment"])
+def test_a_motion_turns_at_a_limit_where_it_stops_or_passes(
+    robot: str, side: float, given: str
+) -> None:
+    """Between its ends a joint at its limit rests: that costs what resting there costs alone."""
+    n, tolerance = len(ROBOTS[robot]), 1e-5
+    start, via = np.full(n, 0.3 * side), np.linspace(0.6, 0.9, n) * side
+    via[0] = 1.5 * side  # at its bound
+    rest = hovi.State(via, np.zeros(n))
+    asked = options(robot) | {"tolerance": tolerance}
+    wider = asked["limits"] | {"q": [1.7] + [1.5] * (n - 1)}
+    free = robot == "ur5" and given in ("a configuration", "a free segment")
+    names = scene(robot).robot.joint_names[1:] if free else []
+    resting = hovi.State(via, np.zeros(n), free_velocity=names)
+
+    def through(goal: hovi.State, limits: Any) -> hovi.Solution:
+        others = asked | {"limits": limits}
+        if "segment" not in given:
+            return hovi.plan(scene(robot), start, start, T, via=[hovi.Via(T / 2, goal)], **others)
+        segments = [hovi.Segment(goal, T / 2), hovi.Segment(start, T / 2)]
+        return hovi.plan_sequence(scene(robot), start, segments, **others)
+
+    goal = {
+        "a velocity": rest,
+        "a configuration": hovi.State(via),
+        "a segment": rest,
+        "a free segment": hovi.State(via, free_velocity=["all"]),
+    }[given]
+    found, alone = through(goal, asked["limits"]), through(resting, wider)
+    assert found.success, found.message
+    assert alone.success, alone.message
+    q = found.trajectory.sample(np.linspace(0.0, T, SAMPLES)).q
+    assert (side * q[:, 0]).max() <= 1.5 + 1e-9
+    assert found.cost == pytest.approx(alone.cost, rel=3 * tolerance)

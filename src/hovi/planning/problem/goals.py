@@ -28,11 +28,14 @@ from hovi.robot.space.coordinates import Coordinates
 from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
+Mask = npt.NDArray[np.bool_]
 
 FREE = "free"
 """The time of a via point that is passed when that costs least."""
 SATISFIED = 1e-6
 """Largest distance, in [m], and angle, in [rad], between a goal and a frame that satisfies it."""
+AT_LIMIT = 1e-9
+"""Distance from its limit, relative to its range, up to which a position is at it."""
 FULL_RANK = 1e-6
 """Least singular value of a goal's Jacobian at an isolated configuration, relative to its norm."""
 
@@ -187,14 +190,29 @@ def _least_velocity(robot: Robot, q: Array, wanted: Sequence[Function]) -> Array
     return np.asarray(v, dtype=float)
 
 
-def via_differences(via: Via, reached: GoalState, coordinates: Coordinates) -> tuple[Function, ...]:
-    """What vanishes at a via point. reached: a state that reaches its goal."""
+def via_differences(
+    reached: GoalState, coordinates: Coordinates, limits: Limits | None
+) -> tuple[Function, ...]:
+    """What vanishes at a via point. reached: a state that reaches its goal. limits: there."""
     if reached.differences:
         return reached.differences
     q, v = reached.state.on(coordinates, "via")
     held = ~reached.state.free_on(coordinates, "via")
     held[1] &= reached.state.v is not None
+    held[1] |= turning(q, held[0], coordinates, limits)
     return (StateDifference(coordinates, (q, v), held),)
+
+
+def turning(q: Array, held: Mask, coordinates: Coordinates, limits: Limits | None) -> Mask:
+    """Which joints, given at a limit between the ends, can but rest there, (nv,).
+
+    q: shape (nq,). held: which components are given. limits: there; None for none.
+    """
+    if limits is None:
+        return np.zeros(held.shape, dtype=bool)
+    x = coordinates.space.coordinates(q)
+    apart = np.minimum(np.abs(x - limits.lower[0]), np.abs(limits.upper[0] - x))
+    return np.asarray(held & np.isfinite(apart) & (apart <= AT_LIMIT * limits.ranges[0]))
 
 
 @lru_cache(maxsize=256)

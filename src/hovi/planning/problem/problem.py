@@ -173,6 +173,19 @@ class TrajectoryProblem(ProblemSummary):
             ends = self.ends[0], self.free_ends, self.grid.duration
             object.__setattr__(self, "clearance", with_gaps(self.robot, self.clearance, *ends))
 
+    @property
+    def given_between(self) -> list[tuple[int, Mask]]:
+        """Nodes between the ends, and which of (q, q', ...) is given at seams and via points."""
+        rest = self.ld.k - 2, self.coordinates.nv
+        found = [
+            (each.node, np.concatenate([each.fixed, np.full(rest, each.higher is not None)]))
+            for each in self.holds
+        ]
+        for each in self.equations:
+            if isinstance(each.y, StateDifference) and each.where.node < self.grid.intervals:
+                found.append((each.where.node, each.y.held))
+        return found
+
     def _given_at_nodes(self) -> dict[int, NodeState]:
         """What is given at the nodes at both ends, at seams, and where equations are asked."""
         (q0, q1), (v0, v1), N = self.ends[0], self.ends[1], self.grid.intervals

@@ -13,7 +13,13 @@ from hovi.discrete.grid import DiscretePath, Grid
 from hovi.discrete.guess import Curve, Ends, joined, named_curve, with_ends_of_nodes
 from hovi.discrete.interval_paths import path_of_order, regularized_nodes
 from hovi.discrete.state import State
-from hovi.planning.problem.goals import Via, goal_state, require_times, via_differences
+from hovi.planning.problem.goals import (
+    Via,
+    goal_state,
+    require_times,
+    turning,
+    via_differences,
+)
 from hovi.planning.problem.limits import Limits
 from hovi.planning.problem.notation.goal_turns import keeping_turns, turns_to
 from hovi.robot.space.coordinates import Coordinates
@@ -106,10 +112,11 @@ class ViaPoints:
             name, node = f"via point at {each.time:g} s", grid.node_at(each.time)
             bounds = None if limits is None else limits.until(each.time)
             reached = goal_state(each.goal, name, coordinates, q0, bounds, free)
-            wanted = via_differences(each, reached, coordinates)
+            wanted = via_differences(reached, coordinates, bounds)
             if isinstance(each, Seam):
                 wanted, goal = reached.differences, reached.state
                 fixed, (q, v) = ~goal.free_on(coordinates, "via"), goal.on(coordinates, "via")
+                fixed[1] |= turning(q, fixed[0], coordinates, bounds)
                 turns = turns_to(goal, last, coordinates, q0, q)
                 last, q0 = keeping_turns(last, coordinates, q0, q, turns), q
                 holds.append(Hold(node, each.time, q, v, fixed, goal, turns, last, each.higher))

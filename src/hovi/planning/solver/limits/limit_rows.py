@@ -26,7 +26,6 @@ from hovi.discrete.interval_batch import Coordinates
 from hovi.discrete.interval_paths import scaled_data
 from hovi.optimize.program import Refinement
 from hovi.planning.problem.limits import Limits
-from hovi.planning.problem.seams import Hold
 from hovi.planning.problem.way_back.excused import Excused
 from hovi.planning.solver.limits.graded_parts import graded
 from hovi.planning.solver.limits.limited_coordinates import LimitedCoordinates
@@ -66,8 +65,8 @@ class LimitRows:
 
     grid: on which they are. limits: imposed. space: of the configurations; None for a vector space.
     free_ends: which of (q, q', ..., q^(k-1)) are free at the start and at the goal, (2, k, nv); all
-        are given if None. holds: what is fixed at nodes between them. A control point that is given
-        with a node has no row, so that a joint may be at its limit there.
+        are given if None. given: nodes between them and what is given there, (j, nv). A control
+        point that is given with a node has no row, so that a joint may be at its limit there.
     halvings: of all intervals for the control points of positions, and for those of derivatives.
     barrier: the last barrier parameter, relative to the mean density of the cost.
     ends: next to which parts are short enough for what is given there; None where it is not known.
@@ -90,16 +89,15 @@ class LimitRows:
         free_ends: Mask | None = None,
         halvings: tuple[int, int] = (0, 0),
         barrier: float = 0.0,
-        holds: Sequence[Hold] = (),
+        given: Sequence[tuple[int, Mask]] = (),
     ) -> None:
         self.grid = grid
         self.space = space
         shape = grid.intervals + 1, grid.order, limits.lower.shape[1]
         self.free = np.ones(shape, dtype=bool)
         self.free[[0, -1]] = False if free_ends is None else free_ends
-        for each in holds:
-            self.free[each.node, :2] = ~each.fixed
-            self.free[each.node, 2:] = each.higher is None
+        for node, fixed in given:
+            self.free[node, : len(fixed)] &= ~fixed
         self.limits = limits
         self.fixed = False
         self._instants: tuple[Grid, Instants] | None = None

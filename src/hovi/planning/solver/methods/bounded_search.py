@@ -163,7 +163,7 @@ class BoundedSearch:
 
     def _rows(self, halvings: tuple[int, int]) -> LimitRows:
         problem, limits, barrier = self.problem, self.limits, self.criteria.barrier
-        ends = problem.free_ends, halvings, barrier, problem.holds
+        ends = problem.free_ends, halvings, barrier, problem.given_between
         return LimitRows(problem.grid, limits, problem.coordinates.curved_space, *ends)
 
     def no_near_rows(self) -> ClearanceRows:
