@@ -36,7 +36,7 @@ class MarginsBetweenPoints:
     excess: over the lower and upper bounds of each interval, at all times, (2, N, K), from a motion
         of a problem; as fractions of the ranges.
     tolerance: largest excess that is none.
-    values: by which bounds are tightened, (2, N, K).
+    values: by which bounds are tightened, (2, N, K). fixed: whether they stay.
     """
 
     def __init__(
@@ -45,7 +45,7 @@ class MarginsBetweenPoints:
         tolerance: float,
         shape: tuple[int, int, int],
     ) -> None:
-        self.excess, self.tolerance = excess, tolerance
+        self.excess, self.tolerance, self.fixed = excess, tolerance, False
         self.values = np.zeros(shape)
         self.begin()
 
@@ -68,7 +68,7 @@ class MarginsBetweenPoints:
         level: barrier parameter at the motion, relative to the mean density of the cost.
         """
         near = at_points > -LARGEST_MARGIN
-        if not near.any():
+        if self.fixed or not near.any():
             return False
         between = self.excess(problem, path)
         beyond = np.where(near, between - np.where(near, at_points, 0.0), 0.0)

@@ -48,6 +48,11 @@ def feasible_motion(search: BoundedSearch) -> tuple[Bounded, str]:
         ended = cleared_motion(search, search.guess)
     elif ended is None:
         ended = search.solve(Start(search.guess))
+        if ended.why is Reason.DIVERGED and search.margins.values.any():
+            # next to what is given at a bound a margin leaves no room: intervals are halved instead
+            search.margins = search.no_margins()
+            search.margins.fixed = True
+            ended = search.solve(Start(search.guess))
     failed = ended.why is Reason.DIVERGED
     if search.near is not None and failed:
         missed = search.too_close if ended.feasible else search.worst
