@@ -108,9 +108,17 @@ def measure(arm: str, kind: str, count: int, seed: int, time_limit: float) -> li
 
 
 def judge(
-    scene: hovi.Scene, meshes: Meshes, kind: str, task: KeptTask, found: hovi.Solution
+    scene: hovi.Scene,
+    meshes: Meshes | None,
+    kind: str,
+    task: KeptTask,
+    found: hovi.Solution,
+    limits: str = "urdf",
 ) -> tuple[float, float, float, str]:
-    """What is missed, in [m] and [rad], the largest speed, and what is wrong with a success."""
+    """What is missed, in [m] and [rad], the largest speed, and what is wrong with a success.
+
+    meshes: of links that keep their margin; None for a motion that keeps none.
+    """
     model, frame = torque_model(scene), scene.robot.tip_frames[0]
     t = np.linspace(0.0, task.duration, SAMPLES)
     x = found.trajectory.sample(t)
@@ -134,11 +142,12 @@ def judge(
         "line or plane": missed > DISTANCE,
         "direction": angle > (ROOM * (1 + 1e-6) if "within" in kind else ANGLE),
         "speed": "m/s" in kind and speed > SPEED * (1 + 1e-5),
-        "limits": largest_excess(scene, found.trajectory, hovi.as_limits(scene.robot, "urdf"))
+        "limits": largest_excess(scene, found.trajectory, hovi.as_limits(scene.robot, limits))
         > MAX_EXCESS,
         "integral": abs(integral - found.cost) > INTEGRAL * found.cost,
         "goal": float(np.abs(p[-1] - task.place).max()) > 1e-6,
         "distances of links": found.success
+        and meshes is not None
         and meshes.least_along(found.trajectory) < DEFAULT_MARGIN - ALLOWED,
         "rest": float(max(np.abs(x.v[0]).max(), np.abs(x.v[-1]).max())) > 1e-8,
     }

@@ -20,8 +20,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 from kept_paths import KeptTask, pose, random_tasks
+from kept_tasks import judge
 from measuring import alone, print_machine, print_table
-from random_arms import arm_scene, largest_excess, middle_and_most, rnea, timed, torque_model
+from random_arms import arm_scene, middle_and_most, timed, torque_model
 
 import hovi
 from hovi.conditions import Keep, OnLine, Upright
@@ -37,8 +38,6 @@ KINDS: dict[str, Callable[[str], list[Keep]]] = {
 LONG, LONG_START = 0.6, (-0.6, -1.2, 1.9, -2.27, -1.57, 0.0)
 """Length of the UR10's line along y, in [m], and where it starts."""
 LONG_DURATION = 2.0
-SAMPLES, MAX_EXCESS, INTEGRAL = 20_000, 1e-6, 2e-3
-DISTANCE, ANGLE = 1e-5, np.deg2rad(0.01)
 
 
 @dataclass(frozen=True)
@@ -75,40 +74,14 @@ def measure(arm: str, kind: str, count: int, seed: int) -> list[Pair]:
         kept, free = timed(partial(plan, goal, keep=keep)), timed(partial(plan, goal))
         end = kept[1].trajectory.q[-1]
         again, there = timed(partial(plan, end, keep=keep)), timed(partial(plan, end))
-        judged = judge(scene, kind, task, kept[1], limits)
+        missed, angle, _, said = judge(scene, None, kind, task, kept[1], limits)
         found = [each.success for _, each in (kept, free, again, there)]
         missing = "" if all(found) else f"minima: {found}"
         steps = kept[1].nit / free[1].nit, again[1].nit / there[1].nit
         seconds = kept[0] / free[0], again[0] / there[0]
-        wrong = ", ".join(filter(None, (judged[2], missing)))
-        pairs.append(Pair(*judged[:2], wrong, steps, seconds, kept[0]))
+        wrong = ", ".join(filter(None, (said, missing)))
+        pairs.append(Pair(missed, angle, wrong, steps, seconds, kept[0]))
     return pairs
-
-
-def judge(
-    scene: hovi.Scene, kind: str, task: KeptTask, found: hovi.Solution, limits: str
-) -> tuple[float, float, str]:
-    """What is missed, in [m] and [rad], and what is wrong with a motion."""
-    model, frame = torque_model(scene), scene.robot.tip_frames[0]
-    t = np.linspace(0.0, task.duration, SAMPLES)
-    x = found.trajectory.sample(t)
-    poses = np.array([pose(model, frame, q) for q in x.q])
-    away, up = poses[:, :3, 3] - poses[0, :3, 3], poses[:, :3, :3] @ poses[0, 2, :3]
-    along = (task.place - poses[0, :3, 3]) / np.linalg.norm(task.place - poses[0, :3, 3])
-    off = float(np.linalg.norm(away - np.outer(away @ along, along), axis=1).max())
-    angle = float(np.arctan2(np.linalg.norm(up[:, :2], axis=1), up[:, 2]).max())
-    tau = rnea(model, x.q, x.v, x.a)
-    integral = float(np.trapezoid(0.5 * (tau**2).sum(axis=1), t))
-    excess = largest_excess(scene, found.trajectory, hovi.as_limits(scene.robot, limits))
-    said = {
-        "line": "line" in kind and off > DISTANCE,
-        "direction": "upright" in kind and angle > ANGLE,
-        "limits": excess > MAX_EXCESS,
-        "integral": abs(integral - found.cost) > INTEGRAL * found.cost,
-        "goal": float(np.abs(poses[-1, :3, 3] - task.place).max()) > 1e-6,
-    }
-    wrong = ", ".join(name for name, bad in said.items() if bad)
-    return (off if "line" in kind else 0.0), (angle if "upright" in kind else 0.0), wrong
 
 
 def row(name: str, pairs: list[Pair]) -> list[Any]:

@@ -38,10 +38,7 @@ def export(
     ] = None,
     then: Annotated[
         list[Path] | None,
-        typer.Option(
-            metavar="FILE.npz",
-            help="A motion that follows; may be repeated.",
-        ),
+        typer.Option(metavar="FILE.npz", help="A motion that follows; may be repeated."),
     ] = None,
     gap: Annotated[
         float, typer.Option(help="Seconds for which the robot rests between motions.")

@@ -24,6 +24,7 @@ from hovi.planning.solver.bounded_action import BoundedAction
 from hovi.planning.solver.free_duration.joint_solve import solves_jointly
 from hovi.planning.solver.free_duration.timed_action import TimedAction
 from hovi.planning.solver.free_duration.timed_bounded_action import TimedBoundedAction
+from hovi.planning.solver.free_duration.timed_model import TimedModel
 from hovi.planning.solver.free_duration.timed_path import TimedPath
 from hovi.planning.solver.limits.limit_rows import LimitRows
 from hovi.planning.solver.multipliers import Multipliers
@@ -107,6 +108,19 @@ def test_the_model_has_the_derivatives_of_the_action(
         assert bend == pytest.approx(step @ hessian @ step, rel=1e-6)
 
 
+def away_from_cubic(
+    objective: TimedBoundedAction, rng: np.random.Generator
+) -> tuple[TimedPath, TimedModel]:
+    """A motion some way from the cubic guess, and the model there, without the terms of bounds."""
+    none = np.zeros(len(objective.bounds.lower))
+    x = TimedPath(objective.first.problem.guess("cubic"), objective.lengths)
+    model = objective.model(x, none, none, none)
+    x = objective.retract(x, 0.2 * rng.normal(size=len(model.gradient)), model)
+    model = objective.model(x, none, none, none)
+    assert isinstance(model, TimedModel)
+    return x, model
+
+
 @pytest.mark.parametrize("goals", [AT_REST, FREE], ids=["rest", "free"])
 @pytest.mark.parametrize("name", CLOCKS)
 def test_bounded_outputs_change_as_predicted(name: str, goals: tuple[hovi.State, ...]) -> None:
@@ -118,17 +132,13 @@ def test_bounded_outputs_change_as_predicted(name: str, goals: tuple[hovi.State,
     rows = LimitRows(GRID, limits, None, problem.free_ends, (0, 1))
     bounded = BoundedAction(problem, limits, rows=rows)
     objective = TimedBoundedAction(bounded, price_of(clock, len(lengths)), lengths)
-    zero = np.zeros(len(objective.bounds.lower))
-    x = TimedPath(problem.guess("cubic"), lengths)
-    model = objective.model(x, zero, zero, zero)
-    x = objective.retract(x, 0.2 * rng.normal(size=len(model.gradient)), model)
-    model = objective.model(x, zero, zero, zero)
+    x, model = away_from_cubic(objective, rng)
     step = 1e-4 * rng.normal(size=len(model.gradient))
     moved = [objective.outputs(objective.retract(x, e * step, model)).y for e in (1.0, -1.0)]
     predicted = objective.push(step, model)
     assert np.abs(predicted).max() > 1e-5
     np.testing.assert_allclose((moved[0] - moved[1]) / 2.0, predicted, rtol=0, atol=1e-9)
-    forces = rng.normal(size=len(zero))
+    forces = rng.normal(size=len(objective.bounds.lower))
     work = np.vdot(objective.bounds.weights * forces, predicted)
     whole = objective.pull(forces, model) @ step
     assert whole == pytest.approx(work, rel=1e-9)
@@ -157,11 +167,7 @@ def test_equations_between_seams_do_not_depend_on_lengths(name: str) -> None:
         inside = [each.where.node not in (2, 5) for each in group.given]
         mu.reshape(len(inside), -1)[inside] = 0.0
     objective = TimedBoundedAction(bounded, price_of(clock, len(lengths)), lengths)
-    zero = np.zeros(len(objective.bounds.lower))
-    x = TimedPath(problem.guess("cubic"), lengths)
-    model = objective.model(x, zero, zero, zero)
-    x = objective.retract(x, 0.2 * rng.normal(size=len(model.gradient)), model)
-    model = objective.model(x, zero, zero, zero)
+    x, model = away_from_cubic(objective, rng)
     hessian, inner = hessian_of(model), model.inner
     assert isinstance(inner, EquationModel)
     assert solves_jointly(problem, clock, lengths, near=True)

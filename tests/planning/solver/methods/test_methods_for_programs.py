@@ -133,7 +133,9 @@ def test_other_solvers_of_quadratic_programs_end_there_too(solver: str) -> None:
 def test_matrices_are_those_of_differences() -> None:
     known = by_interior_point("ur5", 1)
     program = program_of(known)
-    path, z = known.trajectory.path, known.solved_bounds.barrier.multipliers  # type: ignore
+    path, solved = known.trajectory.path, known.solved_bounds
+    assert solved is not None
+    z = solved.barrier.multipliers
     here = program.quadratic(path, z)
     rng, h = np.random.default_rng(0), 1e-5
     s = rng.normal(size=here.gradient.shape)
