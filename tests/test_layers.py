@@ -38,6 +38,7 @@ WITH_ORACLES = {
     "planning/solver/free_duration/test_parts_of_free_length.py",
     "planning/solver/limits/test_limit_rows.py",
     "planning/solver/near/test_rows_on_groups.py",
+    "planning/solver/test_between_points.py",
     "planning/solver/test_equations_along.py",
     "samples/interval_problems.py",
     "test_rules.py",

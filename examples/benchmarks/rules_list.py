@@ -37,9 +37,6 @@ NOTICED = {
     "search again on the new grid": "test_the_code_of_a_page_runs[from_drake]",
     "another branch clear of links": "test_links_that_would_meet_count_in_the_choice",
     "held ends": "test_random_poses_are_reached_in_the_cheapest_branch[11]",
-    "few steps where the duration moves": (
-        "test_tightened_bounds_that_take_many_steps_give_way_to_halved_intervals"
-    ),
     "neighbours are halved, too": "limited reach bravo7_no_ee 2 of side_by_side.py",
     "halved intervals from the motion": "limited reach bravo7_no_ee 2 of side_by_side.py",
     "several sides": "task xarm7_bin_to_bin",
@@ -774,24 +771,24 @@ _rule(
 _at("limits", "planning.solver.between_points")
 _rule(
     "margins follow",
-    "Bounds at points are tightened for what a motion exceeds between them while it is sought.",
-    "follow",
+    "Bounds at points are tightened for what a motion exceeds between them as it is found.",
+    "MarginsBetweenPoints.follow",
     "not near.any()",
     "True",
 )
 _rule(
     "unused margins",
     "A margin that is not used is relaxed, once at each barrier parameter.",
-    "follow",
-    "& ~self._firm",
-    "& False",
+    "MarginsBetweenPoints.follow",
+    "(wanted < self.values - UNUSED * self.tolerance) & ~self._firm",
+    "(wanted < self.values) & False",
 )
 _rule(
     "margins by secants",
     "A margin changes as its last two values extrapolate, not by the whole excess.",
-    "follow",
-    "-STEEPEST, 0.0",
-    "0.0, 0.0",
+    "MarginsBetweenPoints.follow",
+    "np.clip(slope, -STEEPEST, 0.0)",
+    "0.0 * slope",
 )
 _at("limits", "planning.solver.methods.limits_between_points")
 _rule(

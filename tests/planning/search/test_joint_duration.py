@@ -56,8 +56,8 @@ def test_a_free_duration_takes_at_most_three_times_the_steps_of_given_ones(
     assert "The best duration is" in free.message
 
 
-def test_tightened_bounds_that_take_many_steps_give_way_to_halved_intervals() -> None:
-    """With tightened bounds this duration moves for 200 steps, with halved intervals for 12."""
+def test_a_duration_within_torques_between_the_points_takes_few_steps() -> None:
+    """Bounds that are tightened in rounds move this duration for 200 steps."""
     ends, options = ends_of("panda_reach_limited")
     options |= {"intervals": 24}
     free = hovi.plan(*ends, (0.5, 6.0), time_weight=50.0, **options, self_collision=False)

@@ -5,10 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 import hovi
 from hovi.optimize.barrier import Barrier, Bounds
+from hovi.optimize.interior_point import minimize_bounded
 from hovi.planning.solver.between_points import LARGEST_MARGIN, MarginsBetweenPoints
 
 START = np.array([0.0, -1.2, 1.5, -1.8, -1.57, 0.0])
@@ -69,7 +71,6 @@ def test_one_solve_ends_within_bounds_between_the_points(
     """And one compares it with a finer grid; each time that bounds are tightened took another."""
     name = "hovi.planning.solver.methods.bounded_search.minimize_bounded"
     solves = list[int]()
-    from hovi.optimize.interior_point import minimize_bounded
 
     def counted(*given: Any) -> Any:
         ended = minimize_bounded(*given)
@@ -99,7 +100,5 @@ def test_one_solve_ends_within_bounds_between_the_points(
 
 
 def linear_speed(model: Any, data: Any, frame: int, q: Any, v: Any) -> float:
-    import pinocchio as pin
-
     pin.forwardKinematics(model, data, q, v)
     return float(np.linalg.norm(pin.getFrameVelocity(model, data, frame).linear))

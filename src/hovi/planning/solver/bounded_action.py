@@ -61,7 +61,7 @@ class BoundedAction(Program[DiscretePath]):
     tolerances: tuple[float, float] | None = None
     penalty: float = 0.0
     between: MarginsBetweenPoints | None = None
-    """Margins that follow the motion while it is sought; None if they stay."""
+    """Margins that follow the motion from step to step; None if they stay."""
 
     def __init__(
         self,
