@@ -212,9 +212,7 @@ class Resolution(MotionCheck):
     def prices(self) -> Array | None:
         """Prices of its limits: see limit_prices; None without limits, and if not known."""
         motion = self.motion
-        if motion is None or motion.problem is None or motion.forces is None:
-            return None
-        return limit_prices(motion) if motion.problem.limited else None
+        return None if motion is None or motion.prices is None else limit_prices(motion)
 
     @cached_property
     def largest_change(self) -> float:
@@ -269,7 +267,10 @@ class Resolution(MotionCheck):
         if far > NEARBY and far > self.largest_change:  # expensive: not for small changes
             return None
         if self.prices is not None:
-            changes = np.abs(limit_prices(solution) - self.prices)
+            prices = limit_prices(solution)
+            if prices.shape != self.prices.shape:
+                return None
+            changes = np.abs(prices - self.prices)
             if (changes > PRICE_CHANGE * np.maximum(self.prices, LEAST_PRICE)).any():
                 return None
             more = ERROR_PER_PRICE * float(changes.max())

@@ -142,6 +142,7 @@ def repeated(cycle: Solution, times: int) -> Solution:
         "n_neg": cycle.n_neg if cycle.n_neg < 0 else times * cycle.n_neg,
         "forces": forces,
         "instants": instants,
+        "prices": None if cycle.prices is None else times * cycle.prices,
     }
     path = _path(cycle.trajectory.path, times)
     answer = Answer(problem, path, status=cycle.status, message=message, **changes)

@@ -6,6 +6,9 @@ import dataclasses
 from dataclasses import field
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+import numpy.typing as npt
+
 from hovi.conditions.excess import undecided
 from hovi.discrete.grid import DiscretePath
 from hovi.discrete.instants import Instants
@@ -27,6 +30,8 @@ if TYPE_CHECKING:
     from hovi.planning.solver.central_path import CentralPath
     from hovi.planning.solver.outcome.solution_factor import SolvedBounds
 
+Array = npt.NDArray[np.float64]
+
 
 @dataclass(frozen=True, eq=False)
 class Answer:
@@ -40,6 +45,8 @@ class Answer:
     forces: multipliers of limits and constraints at the quadrature points, then of limits at
         instants between them; None without any.
     instants: these instants; None without any.
+    prices: how far every bound moves the cost, per range, (2, kinds): see BoundedAction.prices;
+        None without bounds.
     jets: (q, v, a) of the path at the quadrature points, if they were computed.
     model: the quadratic model of the last step of a solve without bounds or equations.
     central: the path of a barrier method towards the motion, for warm starts.
@@ -56,6 +63,7 @@ class Answer:
     history: list[Iteration] = field(default_factory=list)
     forces: list[PointTerms] | None = None
     instants: Instants | None = None
+    prices: Array | None = None
     jets: list[Jet] | None = None
     model: QuadraticModel | None = None
     central: CentralPath | None = None

@@ -225,6 +225,22 @@ class BoundedAction(Program[DiscretePath]):
             self.action.equations.add_forces(terms, known.conditions, self.action.jets(x))
         return terms
 
+    def prices(self, multipliers: Array) -> Array:
+        """|d cost| / d(lower, upper) per range of what is bounded, (2, kinds), not negative.
+
+        By the envelope theorem sum w |z|, of the values at the points, then of the coordinates of
+        control points, then of all distances, in their unit. multipliers: of the outputs, (R,).
+        """
+        forces = self.plain(self.bounds.weights * multipliers)
+        values = self._point_count // self._points
+        kinds, most = np.tile(np.arange(values), self._points), values
+        if self.rows is not None:
+            kinds = np.append(kinds, values + self.rows.coordinate)
+            most += len(self.rows.of.order)
+        kinds = np.append(kinds, np.full(len(forces) - len(kinds), most))
+        sides = np.maximum(-forces, 0.0), np.maximum(forces, 0.0)
+        return np.stack([np.bincount(kinds, each, most + 1) for each in sides])
+
     @property
     def _timed(self) -> bool:
         """Whether further outputs or their bounds depend on time itself, or may."""

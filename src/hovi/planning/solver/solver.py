@@ -98,6 +98,7 @@ class Solution(SolutionSummary):
     setup_seconds, solve_seconds: wall time before and during the solve. problem: what was solved.
     forces: multipliers of limits and of passive joints' torques at the quadrature points, and of
         limits at instants between them. instants: these; None for none.
+    prices: how far every bound moves the cost, per range, (2, kinds); None without bounds.
     central, model: what `replan` starts from, the path of a barrier method or the last model.
     solved_bounds: where a solve within limits ended, from which `factor` follows; None for others.
     check: returns a replanned motion with its error estimate or as UNRESOLVED; None for no check.
@@ -119,6 +120,7 @@ class Solution(SolutionSummary):
     solve_seconds: float = 0.0
     forces: list[PointTerms] | None = field(default=None, repr=False)
     instants: Instants | None = field(default=None, repr=False)
+    prices: Array | None = field(default=None, repr=False)
     central: CentralPath | None = field(default=None, repr=False)
     model: QuadraticModel | None = field(default=None, repr=False)
     solved_bounds: SolvedBounds | None = field(default=None, repr=False)
@@ -460,6 +462,7 @@ def solution_of(result: Answer, setup_seconds: float = 0.0, solve_seconds: float
         solve_seconds=solve_seconds,
         forces=result.forces,
         instants=result.instants,
+        prices=result.prices,
         central=result.central,
         model=result.model,
         solved_bounds=result.solved_bounds,

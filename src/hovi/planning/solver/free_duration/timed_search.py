@@ -195,6 +195,7 @@ def _searched(search: TimedSearch) -> Answer:
         search.history,
         forces,
         instants,
+        search.prices(ended),
         central=central,
     )
 

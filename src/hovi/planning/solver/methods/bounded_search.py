@@ -334,6 +334,10 @@ class BoundedSearch:
         further = by_segment(self.problem, instants, further)
         return instants, self._forces_at_points(ended) + further
 
+    def prices(self, ended: Bounded) -> Array:
+        """How far every bound moves the cost: see BoundedAction.prices."""
+        return self._objective_of(ended).prices(ended.z.multipliers)
+
     def _forces_at_points(self, ended: Bounded) -> list[PointTerms]:
         """Those of limits at the quadrature points and of constraints."""
         known = self.multipliers

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 
 from hovi.discrete.grid import DiscretePath
@@ -95,14 +97,16 @@ def _searched(search: BoundedSearch) -> Answer:
         status, message = Status.MINIMUM, _minimum(search, value, excess)
     else:
         status, message = Status.SADDLE, _saddle(value, n_neg)
-    instants, forces = None, None
+    instants, forces, prices = None, None, None
     if ended.why not in (*STOPPED, Reason.DIVERGED):  # or rows may be of a later attempt
         instants, forces = search.forces(ended)
+        prices = search.prices(ended)
     history, central, solved = search.history, None, None
     if status is Status.MINIMUM:
         central, solved = search.central_path(ended), search.solved_bounds(ended)
     counted = value, status, message, nit, n_neg, history
-    return Answer(problem, x, *counted, forces, instants, central=central, solved_bounds=solved)
+    found = Answer(problem, x, *counted, forces, instants, prices)
+    return dataclasses.replace(found, central=central, solved_bounds=solved)
 
 
 def _ended(search: BoundedSearch, why: Reason) -> Answer:
