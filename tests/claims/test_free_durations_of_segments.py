@@ -145,12 +145,16 @@ def test_a_stopped_search_keeps_the_best_motion() -> None:
 def test_durations_that_change_much_within_limits_are_stationary() -> None:
     """With a payload and a high price of time; bounds cut the first steps of the joint solve."""
     segments = changed(stops(**ALL), effects=[Payload(arm().robot.tip_frame, 0.5)])
-    found = planned(segments, {"limits": TORQUES}, time_weight=100.0)
+    options = {
+        "limits": TORQUES,
+        "intervals": 96,
+    }  # on fewer, other durations cost 1e-3 less or more
+    found = planned(segments, options, time_weight=100.0)
     assert found.success, found.message
     T = durations_of(found)
     for fraction in (0.99, 1.01):
         near = T * np.array([fraction, 1.0, 1.0])
-        again = planned(lasting(segments, near), {"limits": TORQUES}, guess=found.trajectory)
+        again = planned(lasting(segments, near), options, guess=found.trajectory)
         assert not again.success or again.cost + 100.0 * near.sum() > found.cost * (1 - 1e-4)
 
 

@@ -337,8 +337,11 @@ class Barrier:
 
 
 def _changes(before: Array, now: Array) -> Array:
-    """Changes of bounds; 0 of those that are infinite."""
-    return np.where(np.isfinite(before), now - np.where(np.isfinite(before), before, 0.0), 0.0)
+    """Changes of bounds; 0 of those that are infinite, or were."""
+    finite = np.isfinite(before) & np.isfinite(now)
+    change = np.zeros(len(now))
+    np.subtract(now, before, out=change, where=finite)
+    return change
 
 
 def _gaps(bounds: Bounds, s: Array) -> Pair:

@@ -257,7 +257,8 @@ class BoundedAction(Program[DiscretePath]):
             jets = zip(self.ld.lagrangians, self.action.jets(x), self._parts, strict=True)
             at = self._motion_at_points(x, [L.output(*jet, t=t[part]) for L, jet, part in jets])
             low, high = more.bounds(t)
-            held = np.where(force > 0, high, np.where(force < 0, low, 0.0))
+            above = np.isfinite(high) & ((force > 0) | ~np.isfinite(low))
+            held = np.where(above, high, np.where(np.isfinite(low), low, 0.0))
             return more.values(dataclasses.replace(at, t=t)) - held
 
         return np.asarray(np.vecdot(force, over_time(beyond, times)))

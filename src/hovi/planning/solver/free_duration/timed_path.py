@@ -36,9 +36,9 @@ def stretched_problem(
 ) -> TrajectoryProblem:
     """The problem for other lengths of its free parts, for the steps of solvers: it is not checked.
 
-    Only the discrete Lagrangian is that of the new lengths, and the parts in which conditions hold:
-    times of via points, seams and limits stay those of the old ones, and no solver reads them. The
-    structure of the Hessian depends on the proportions of the steps alone.
+    Only the discrete Lagrangian is that of the new lengths, and the parts in which limits and
+    conditions hold: times of via points and seams stay those of the old ones, and no solver reads
+    them. The structure of the Hessian depends on the proportions of the steps alone.
     """
     if np.array_equal(lengths, now):
         return problem
@@ -47,6 +47,9 @@ def stretched_problem(
     ld = _new_lagrangian(lagrangian, _new_grid(steps, problem.grid.schemes))
     stretched = copy.copy(problem)
     object.__setattr__(stretched, "ld", ld)
+    if problem.limits is not None and problem.limits.parts:
+        moved_limits = clock.limits(problem.limits, now, lengths)
+        object.__setattr__(stretched, "limits", moved_limits)
     if any(each.during for each in problem.conditions):
         for name in ("conditions", "along"):
             moved = clock.conditions(getattr(problem, name), now, lengths)

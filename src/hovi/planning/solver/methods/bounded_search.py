@@ -374,15 +374,15 @@ class BoundedSearch:
 
         -inf for what rows bound, which holds by construction.
         """
-        trajectory = problem.trajectory(path)
-        sides = np.full((2, trajectory.grid.intervals, *self.limits.lower.shape), -np.inf)
-        for each in limit_conditions(self.limits, trajectory.grid.order, trajectory.space):
+        trajectory, limits = problem.trajectory(path), problem.limits or self.limits
+        sides = np.full((2, trajectory.grid.intervals, *limits.lower.shape), -np.inf)
+        for each in limit_conditions(limits, trajectory.grid.order, trajectory.space):
             if isinstance(each.where, AtPoints) and isinstance(each.on, LimitRange):
                 sides[:, :, each.on.row, each.on.joints] = excess_of(trajectory, each)
         sides = sides.reshape(2, len(sides[0]), -1)
         if self.more is None:
             return sides
-        more = ConditionOutputs(problem).excess(trajectory, self.limits.tolerance)
+        more = ConditionOutputs(problem).excess(trajectory, limits.tolerance)
         return np.concatenate([sides, more], axis=2)
 
     def too_close(self, path: DiscretePath) -> str:
