@@ -91,6 +91,17 @@ class Meshes:
         """The least distance at some times of a motion, (M,), in [m]."""
         return self.distances(motion.sample(t).q).min(axis=1)
 
+    def without_said(self, message: str) -> Meshes:
+        """Those of pairs of which a message does not say that they are not kept apart."""
+        model, shapes = self.robot.model, self.geometry.geometryObjects
+
+        def said(pair: tuple[int, int]) -> bool:
+            one, other = (model.frames[shapes[i].parentFrame].name for i in pair)
+            orders = (one, other), (other, one)
+            return any(f"Links {a!r} and {b!r} are not kept apart" in message for a, b in orders)
+
+        return Meshes(self.robot, tuple(pair for pair in self.pairs if not said(pair)))
+
     def least_along(self, motion: hovi.Trajectory) -> float:
         """The least distance along a motion, in [m], which is looked at around the least ones."""
         t = np.linspace(0.0, motion.duration, INSTANTS)
