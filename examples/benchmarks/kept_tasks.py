@@ -4,8 +4,8 @@ Each has a way by inverse kinematics whose least time, with a fifth in reserve, 
 duration (kept_paths.py), and along which the given meshes of links are APART apart: links are kept
 apart by default, as convex hulls. Motions are judged at 20,000 samples by Pinocchio
 alone: what is kept, limits on q, v and the torques of pin.rnea, and the integral of 1/2 |tau|^2;
-and, at fewer, the distances of the meshes by Coal, but for those that the message leaves out. Steps and times of plans are also given relative
-to the plan of the same ends without what is kept.
+and, at fewer, the distances of the meshes by Coal, but for those that the message leaves out. Steps
+and times of plans are also given relative to the plan of the same ends without what is kept.
 
     python kept_tasks.py [ARM ...] [--count 2] [--seed 0] [--kind WORD] [--runs FILE]
 """
