@@ -52,8 +52,9 @@ class Condition(Generic[Values, Place]):
     scale: of bounded y, one number or one for each entry: by default upper - lower, or
         max(1, |bound|) of a single bound. Bounds that are functions of time need it.
     tolerance: at least 1e-6: the fraction of the scale by which a bound may be exceeded anywhere;
-        by how much y may miss a value between the nodes of a grid, in the unit of y. Values have no
-        scale, and those at given times no tolerance: they are missed by at most 1e-6.
+        how far y may be from a value between the nodes of a grid, in the unit of y, in each entry
+        where entries have names, else in all together. Values have no scale, and those at given
+        times no tolerance: they are missed by at most 1e-6.
     during: (begin, end) in [s], the part of the motion in which it holds, between which grids have
         nodes; the whole motion if None.
     Raises InputError for anything else.

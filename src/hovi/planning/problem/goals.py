@@ -204,7 +204,7 @@ def via_differences(
 
 
 def turning(q: Array, held: Mask, coordinates: Coordinates, limits: Limits | None) -> Mask:
-    """Which joints, given at a limit between the ends, can but rest there, (nv,).
+    """Which joints, given at a limit between the ends, can only rest there, (nv,).
 
     q: shape (nq,). held: which components are given. limits: there; None for none.
     """
