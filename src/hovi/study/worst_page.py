@@ -27,7 +27,11 @@ _PAGE = """<!DOCTYPE html>
 body {{ font-family: sans-serif; margin: 1.5em; }}
 iframe {{ width: 100%; height: 32em; border: 1px solid #bbb; }}
 summary {{ cursor: pointer; padding: 0.4em 0; }}
-@media (max-width: 759px) {{ body {{ margin: 0.7em; }} h1 {{ font-size: 1.3em; }} iframe {{ height: 85vh; }} }}
+@media (max-width: 759px) {{
+    body {{ margin: 0.7em; }}
+    h1 {{ font-size: 1.3em; }}
+    iframe {{ height: 85vh; }}
+}}
 </style></head><body>
 <h1>{title}</h1>
 {motions}
