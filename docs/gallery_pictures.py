@@ -38,8 +38,8 @@ def scrape_motion(block: Any, variables: dict[str, Any], gallery: dict[str, Any]
         variables["hovi_drawn"] = True
         picture = next(variables["image_path_iterator"])
         draw_halfway(new[-1], Path(picture))
-        cautions = "".join(f". Caution: {each}" for each in caution_lines([new[-1].metadata]))
-        drawn[picture] = f"The robot {new[-1].robot.name} halfway through its motion{cautions}"
+        cautions = "".join(f" Caution: {each}" for each in caution_lines([new[-1].metadata]))
+        drawn[picture] = f"The robot {new[-1].robot.name} halfway through its motion.{cautions}"
     path = next(variables["image_path_iterator"])
     try:
         motion_figure(new[-1]).savefig(path, dpi=80)
