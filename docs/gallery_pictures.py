@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -9,6 +10,7 @@ from typing import Any
 from PIL import Image
 
 import hovi
+from hovi.discrete.output.caution import CAUTIONS, caution_lines
 from hovi.exchange.film.pictures import pictures
 from hovi.exchange.film.shot import Shot
 from hovi.viewing.plotting import motion_figure
@@ -36,7 +38,8 @@ def scrape_motion(block: Any, variables: dict[str, Any], gallery: dict[str, Any]
         variables["hovi_drawn"] = True
         picture = next(variables["image_path_iterator"])
         draw_halfway(new[-1], Path(picture))
-        drawn[picture] = f"The robot {new[-1].robot.name} halfway through its motion"
+        cautions = "".join(f" Caution: {each}" for each in caution_lines([new[-1].metadata]))
+        drawn[picture] = f"The robot {new[-1].robot.name} halfway through its motion.{cautions}"
     path = next(variables["image_path_iterator"])
     try:
         motion_figure(new[-1]).savefig(path, dpi=80)
@@ -48,6 +51,13 @@ def scrape_motion(block: Any, variables: dict[str, Any], gallery: dict[str, Any]
 
 
 def draw_halfway(motion: hovi.Trajectory, path: Path) -> None:
-    """Write a picture of the robot halfway through a motion."""
-    *_, halfway = islice(pictures(motion, 2.0 / motion.duration, Shot(SIZE)), 2)
+    """Write a picture of the robot halfway through a motion.
+
+    Cautions are left to the words of the picture: in a thumbnail they could not be read.
+    """
+    unsaid = {
+        key: value for key, value in motion.metadata.items() if key not in (CAUTIONS, "status")
+    }
+    shown = replace(motion, metadata=unsaid)
+    *_, halfway = islice(pictures(shown, 2.0 / shown.duration, Shot(SIZE)), 2)
     Image.fromarray(halfway).save(path)

@@ -20,7 +20,7 @@ from hovi.robot.loading import load_robot
 from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
 from hovi.viewing.replay_session import replay
-from oracles.offline_pages import content_of
+from oracles.offline_pages import parts_of
 from oracles.opened_files import opened_files
 from samples.cubic_motion import cubic_motion
 from samples.meshes import NAMESPACE, collada, mesh_arm, obj
@@ -144,7 +144,7 @@ def _motion(robot: Robot) -> Trajectory:
 
 def _leaks(page: Path) -> bool:
     """Whether the secret is on the page, in its messages or, in base64, in an image in them."""
-    content = content_of(page.read_text())
+    content = b"".join(parts_of(page.read_text()))
     assert b"set_object" in content, "the page has no messages"
     return SECRET in content or base64.b64encode(SECRET)[:60] in content
 

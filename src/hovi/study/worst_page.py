@@ -22,10 +22,16 @@ _PIECES = re.compile(r"(?<=[\n\"'])")
 """Where replays are cut: lines, and the strings in them, of which meshes are some."""
 _PAGE = """<!DOCTYPE html>
 <html lang="en"><head><meta charset="utf-8"><title>{title}</title>
+<meta name="viewport" content="width=device-width, initial-scale=1">
 <style>
 body {{ font-family: sans-serif; margin: 1.5em; }}
 iframe {{ width: 100%; height: 32em; border: 1px solid #bbb; }}
 summary {{ cursor: pointer; padding: 0.4em 0; }}
+@media (max-width: 759px) {{
+    body {{ margin: 0.7em; }}
+    h1 {{ font-size: 1.3em; }}
+    iframe {{ height: 85vh; }}
+}}
 </style></head><body>
 <h1>{title}</h1>
 {motions}

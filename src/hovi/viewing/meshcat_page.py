@@ -51,12 +51,12 @@ function joined(parts) {{
     return whole;
 }}
 (async () => {{
-    const [script, content] = await Promise.all([unpacked("{script}"), unpacked("{content}")]);
+    const [script, small, ...large] = await Promise.all([{packed}].map(unpacked));
     const element = document.createElement("script");
     element.textContent = new TextDecoder().decode(script);
     document.body.append(element);
     const ends = {sizes}.map((sum => size => sum += size)(0));
-    const parts = ends.map((end, i) => content.subarray(i > 0 ? ends[i - 1] : 0, end));
+    const parts = ends.map((end, i) => small.subarray(i > 0 ? ends[i - 1] : 0, end)).concat(large);
     for (const numbers of {messages}) {{
         viewer.handle_command_bytearray(joined(numbers.map(i => parts[i])));
     }}
@@ -65,7 +65,9 @@ function joined(parts) {{
 </script>"""
 """Unpacks meshcat and the page's own script, then the messages, each of which consists of parts.
 
-All messages are handled at once: between two of them the browser would draw what is there so far.
+Large parts are packed each for itself, so that pages of one robot have the same texts for its
+meshes, and small ones together. All messages are handled at once: between two of them the browser
+would draw what is there so far.
 """
 _LARGE_ARRAY = 1_000
 """Size from which an array is a part of its own, in [bytes]: equal parts are packed once."""
@@ -173,16 +175,16 @@ class Page:
         speed: time scale of the animation.
         """
         script = (VIEWER_FOLDER / "main.min.js").read_text(encoding="utf-8")
-        parts: dict[bytes, int] = {}
-        messages = [
-            [parts.setdefault(part, len(parts)) for part in _parts_of(message.packed)]
-            for message in self.messages.all()
-        ]
+        messages = [_parts_of(message.packed) for message in self.messages.all()]
+        parts = dict.fromkeys(part for message in messages for part in message)
+        small = [part for part in parts if len(part) < _LARGE_ARRAY]
+        large = [part for part in parts if len(part) >= _LARGE_ARRAY]
+        numbers = {part: number for number, part in enumerate([*small, *large])}
+        contents = [f"{script}\n{_own_script()}".encode(), b"".join(small), *large]
         start = _OFFLINE.format(
-            script=_compressed(f"{script}\n{_own_script()}".encode()),
-            content=_compressed(b"".join(parts)),
-            sizes=json.dumps([len(part) for part in parts], separators=(",", ":")),
-            messages=json.dumps(messages, separators=(",", ":")),
+            packed=",".join(f'"{_compressed(each)}"' for each in contents),
+            sizes=_json([len(part) for part in small]),
+            messages=_json([[numbers[part] for part in message] for message in messages]),
             speed=float(speed),
         )
         return self._fill(_POLICY.format(script="", socket=""), start)
@@ -235,6 +237,10 @@ def _arrays(value: Any) -> Iterator[bytes]:
     elif isinstance(value, dict | list):
         for each in value.values() if isinstance(value, dict) else value:
             yield from _arrays(each)
+
+
+def _json(value: Any) -> str:
+    return json.dumps(value, separators=(",", ":"))
 
 
 def _compressed(content: bytes) -> str:

@@ -15,6 +15,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from hovi.cli.application import main
+from hovi.robot.loading import load_robot
+from hovi.scene.scene import Scene
 from hovi.study.running.progress import StudyProgress
 from hovi.study.showing.charts import (
     FARTHEST,
@@ -30,6 +32,7 @@ from hovi.study.storage.folder import About, used_alone
 from hovi.study.study import Study
 from hovi.study.worst_page import shared_pieces, write_worst
 from hovi.viewing.replay_session import page_of
+from samples.cubic_motion import cubic_motion
 
 pytest.importorskip("pyarrow")
 pytest.importorskip("pandas")
@@ -156,6 +159,14 @@ def test_the_page_of_the_worst_motions_has_a_replay_of_each(folder: Path, tmp_pa
         own = page_of(Study.motion(folder, plans.columns["key"][row])).offline_html()
         assert "".join(shared[x] if isinstance(x, int) else x for x in pieces) == own
     assert len(text) < 2 * len(own)  # of which each has the viewer
+
+
+def test_replays_of_one_robot_share_its_meshes() -> None:
+    scene = Scene(load_robot("ur5"))
+    pages = [page_of(cubic_motion(scene, seed=seed)[0]).offline_html() for seed in (0, 1)]
+    shared, replays = shared_pieces(pages)
+    own = [sum(len(each) for each in pieces if isinstance(each, str)) for pieces in replays]
+    assert max(own) < 0.2 * sum(map(len, shared))  # curves and links' positions
 
 
 @pytest.mark.parametrize("texts", [[], [""], ["a", "a"], ["x" * 200 + "'b", "'" + "x" * 200]])

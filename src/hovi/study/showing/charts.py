@@ -74,6 +74,7 @@ def histograms_of(plans: Plans) -> ShownFigure:
         ax.hist(numbers, bins=_bins(numbers, logarithmic), color="#2e6f9e")
         ax.set_xscale("log" if logarithmic else "linear")
         ax.set(xlabel=_label(name, plans), ylabel="plans")
+        ax.yaxis.get_major_locator().set_params(integer=True)
     for ax in axes[1 + len(drawn) :]:
         ax.set_axis_off()
     return figure
