@@ -32,6 +32,7 @@ def limit_prices(solution: Solution) -> Array:
     Those of lower bounds come first; kinds: see BoundedAction.prices. 0 without limits, or where
     none is active.
     """
-    if solution.prices is None or solution.cost == 0:
+    problem, prices = solution.problem, solution.prices
+    if problem is None or not problem.limited or prices is None or solution.cost == 0:
         return np.zeros((2, 0))
-    return solution.prices / abs(solution.cost)
+    return prices / abs(solution.cost)

@@ -212,7 +212,9 @@ class Resolution(MotionCheck):
     def prices(self) -> Array | None:
         """Prices of its limits: see limit_prices; None without limits, and if not known."""
         motion = self.motion
-        return None if motion is None or motion.prices is None else limit_prices(motion)
+        if motion is None or motion.problem is None or motion.prices is None:
+            return None
+        return limit_prices(motion) if motion.problem.limited else None
 
     @cached_property
     def largest_change(self) -> float:
