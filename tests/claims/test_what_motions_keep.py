@@ -286,6 +286,19 @@ def test_a_start_that_misses_it_by_more_is_refused_with_the_gap() -> None:
         hovi.plan(scene(), START, goal, (1.0, 2.0), keep=[near])
 
 
+def test_what_is_kept_where_a_via_point_is_missed_is_named() -> None:
+    """Not what is kept elsewhere."""
+    line = OnLine(FRAME, name="seam")
+    before = OnPlane(FRAME, normal=[1, 0, 0], during=(0.0, 0.2 * T), name="wall")
+    beside = hovi.FrameGoal(FRAME, position=begin()[:3, 3] + ASIDE / 2 + [0.05, 0.0, 0.0])
+    goal = hovi.FrameGoal(FRAME, position=begin()[:3, 3] + ASIDE)
+    asked: dict[str, Any] = {"via": [hovi.Via(T / 2, beside)], "self_collision": False}
+    found = hovi.plan(scene(), START, goal, T, keep=[line, before], **asked)
+    assert found.status is hovi.Status.INFEASIBLE
+    assert "frame 'tool0' misses it by" in found.message
+    assert "with 'seam' kept" in found.message
+
+
 def test_a_level_of_a_row_is_checked() -> None:
     row = CasadiRow(lambda v: v[0] + v[1], level=0)
     with pytest.raises(hovi.errors.InputError, match="says level 0, but its level is 1"):
@@ -354,6 +367,12 @@ def test_segments_keep_what_is_theirs() -> None:
     require_kept(found)
     said = {each["name"]: each["during"] for each in found.trajectory.metadata["keep"]}
     assert np.allclose(said["on line tool0 in down"], [1.0, 1.6])
+
+
+def test_a_part_of_a_segment_is_refused() -> None:
+    part = OnLine(FRAME, during=(0.1, 0.3), name="seam")
+    with pytest.raises(hovi.errors.InputError, match="'seam' is kept in a segment from its begin"):
+        hovi.Segment(START, 1.0, keep=[part])
 
 
 def test_free_durations_of_segments_that_keep_something_are_solved_jointly() -> None:

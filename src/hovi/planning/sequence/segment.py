@@ -80,6 +80,12 @@ class Segment:
             from hovi.conditions.kept.kinds import as_kept  # most segments keep nothing
 
             object.__setattr__(self, "keep", as_kept(self.keep))
+        for kept in cast("tuple[Keep, ...]", self.keep):
+            if kept.during is not None:
+                raise InputError(
+                    f"{kept.subject} is kept in a segment from its begin to its end, and has a "
+                    "`during`: leave it out, or give it to the whole sequence."
+                )
         if not isinstance(self.grasped, tuple) or self.grasped:
             from hovi.planning.obstacles.grasped import as_grasped  # most segments carry nothing
 

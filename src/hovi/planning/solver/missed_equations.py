@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hovi.conditions.condition import describe, is_spurious, residual, whose
+from hovi.conditions.condition import Equation, describe, is_spurious, residual, whose
 from hovi.conditions.missed_along import worst_along
 from hovi.discrete.grid import DiscretePath
 from hovi.planning.problem.conditions_of import passive_joints
@@ -73,6 +73,15 @@ def _worst(problem: TrajectoryProblem, path: DiscretePath) -> tuple[str, str]:
     sizes = [float(np.max(np.abs(residual(each, path)))) for each in problem.equations]
     if max(sizes, default=0.0) > FEASIBLE_RESIDUAL:
         worst = problem.equations[int(np.argmax(sizes))]
-        return f"{whose(worst)} at t = {worst.where.time:.4g} s", describe(worst, path)
+        missed = describe(worst, path) + _beside(problem, worst)
+        return f"{whose(worst)} at t = {worst.where.time:.4g} s", missed
     along = worst_along(problem.along, problem.trajectory(path))
     return along.subject, along.missed
+
+
+def _beside(problem: TrajectoryProblem, missed: Equation) -> str:
+    """Which values are kept where a goal or via point is missed, a clause after a comma, or ""."""
+    time = missed.where.time
+    kept = {each.name: each.during or (time, time) for each in problem.along}
+    names = [repr(name) for name, (begin, end) in kept.items() if begin <= time <= end]
+    return f", with {', '.join(names)} kept" if names and missed.name not in kept else ""
