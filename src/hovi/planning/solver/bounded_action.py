@@ -439,9 +439,9 @@ class BoundedAction(Program[DiscretePath]):
         """Bound more control points of the motion: see LimitRows."""
         if self.rows is None:
             return None
+        tighter = self._tightened(x, level)  # may run out of time, and rows are as they were then
         known = None if forces is None else self.plain(forces)[self.row_outputs]
         before, found = self.rows.size, self.rows.refine(x, level, known)
-        tighter = self._tightened(x, level)
         if found is None and not tighter:
             return None
         none = np.zeros(0, dtype=np.intp)

@@ -293,12 +293,13 @@ class ClearanceRows:
         before = self._measured if problem is self._problem else RecentPaths[Array]()
         normals = np.concatenate([self._normals, np.zeros((added, 3))])
         self._set(problem, intervals, positions, pairs, rounding)
+        # with the rows, since measuring them may run out of time
+        self.order = np.append(self.order, len(self.order) + np.arange(added))
         self._measured = before.mapped(lambda known: np.append(known, np.full(added, np.nan)))
         self._normals = normals
         rounding = rounding.copy()
         rounding[-added:] = _rounding_of(self.values(path)[-added:])
         self._round(rounding)
-        self.order = np.append(self.order, len(self.order) + np.arange(added))
         return added
 
     def _set(

@@ -169,6 +169,7 @@ class ClearedAction(BoundedAction):
     ) -> Refinement | None:
         """Bound more control points, and distances where pairs come near: see ClearanceRows."""
         assert self.rows is not None
+        tighter = self._tightened(x, level)  # may run out of time, and rows are as they were then
         order, before = self.near.order, self.rows.size
         known = None if forces is None else self.plain(forces)[self.row_outputs]
         found = self.rows.refine(x, level, known)
@@ -177,7 +178,6 @@ class ClearedAction(BoundedAction):
         sharper = self.near.sharpen(x)
         added = self.near.extend(self.problem, x, AHEAD * level * DISTANCE_SCALE)
         self.blocked = self.near.blocked
-        tighter = self._tightened(x, level)
         if found is None and added == 0 and not (sharper or tighter):
             return None
         kept, origin = np.arange(before), np.zeros(0, dtype=np.intp)
