@@ -12,6 +12,7 @@ from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.near.clearance_rows import ClearanceRows
 from hovi.planning.solver.near.expanded_rows import ExpandedRows
+from hovi.system.deadline import OutOfTimeError
 from samples.floating_arm import BALL, flight, floating
 
 Array = npt.NDArray[np.float64]
@@ -73,3 +74,20 @@ def test_squares_of_rows_are_added() -> None:
     here.add_squares(none, weights, hessian)
     square = np.einsum("kia,kijab,kjb->", columns, hessian, columns, optimize=True)
     assert float(square) == pytest.approx(float(weights @ here.push(columns) ** 2), rel=1e-12)
+
+
+def test_rows_that_time_runs_out_on_can_be_thinned(monkeypatch: pytest.MonkeyPatch) -> None:
+    """They are added with their places among the outputs, before anything is measured."""
+    problem, _, path = rows_along()
+    assert problem.distances is not None
+    rows = ClearanceRows(problem, problem.distances, MARGIN)
+
+    def late(*_: object) -> Array:
+        raise OutOfTimeError
+
+    with monkeypatch.context() as patched:
+        patched.setattr(ClearanceRows, "values", late)
+        with pytest.raises(OutOfTimeError):
+            rows.extend(problem, path, 0.3)
+    assert len(rows.order) == rows.size > 10
+    assert rows.thinned(path, 0.3)[0].size > 0
