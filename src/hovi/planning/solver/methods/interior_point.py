@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
-
 import numpy as np
 
 from hovi.discrete.grid import DiscretePath
@@ -104,9 +102,8 @@ def _searched(search: BoundedSearch) -> Answer:
     history, central, solved = search.history, None, None
     if status is Status.MINIMUM:
         central, solved = search.central_path(ended), search.solved_bounds(ended)
-    counted = value, status, message, nit, n_neg, history
-    found = Answer(problem, x, *counted, forces, instants, prices)
-    return dataclasses.replace(found, central=central, solved_bounds=solved)
+    known = value, status, message, nit, n_neg, history, forces, instants, prices
+    return Answer(problem, x, *known, central=central, solved_bounds=solved)
 
 
 def _ended(search: BoundedSearch, why: Reason) -> Answer:
