@@ -14,7 +14,7 @@ from hovi.optimize.interior_point import minimize_bounded
 from hovi.planning.solver.between_points import LARGEST_MARGIN, MarginsBetweenPoints
 
 START = np.array([0.0, -1.2, 1.5, -1.8, -1.57, 0.0])
-NO_MOTION: Any = (None, None)  # for an excess that does not depend on one
+NOTHING: Any = None  # the motion of an excess that depends on none
 GOAL = np.array([1.2, -0.8, 1.1, -1.8, -1.57, 0.8])  # with the tool's axis as at the start
 
 
@@ -50,7 +50,7 @@ def test_margins_settle_where_a_larger_one_needs_a_smaller_one(slope: float) -> 
         return np.maximum(0.01 + slope * margins.values, 0.0) - margins.values
 
     for _ in range(12):
-        if not margins.follow(*NO_MOTION, at_points(), 1e-8):
+        if not margins.follow(NOTHING, NOTHING, at_points(), 1e-8):
             break
     assert -5.5e-6 <= sides().max() <= 1e-6
     np.testing.assert_allclose(margins.values, 0.01 / (1.0 - slope), atol=1e-5)
@@ -59,9 +59,9 @@ def test_margins_settle_where_a_larger_one_needs_a_smaller_one(slope: float) -> 
 def test_margins_of_bounds_that_are_not_reached_are_none() -> None:
     margins = MarginsBetweenPoints(lambda problem, path: np.full((2, 3, 1), -0.2), 1e-6, (2, 3, 1))
     near = np.full((2, 3, 1), -0.21)
-    assert not margins.follow(*NO_MOTION, near, 1e-3)
+    assert not margins.follow(NOTHING, NOTHING, near, 1e-3)
     margins.values = margins.values + LARGEST_MARGIN
-    assert margins.follow(*NO_MOTION, near + 0.2, 1e-3)
+    assert margins.follow(NOTHING, NOTHING, near + 0.2, 1e-3)
     assert margins.values.max() < 0.011
 
 
