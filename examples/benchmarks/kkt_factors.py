@@ -17,9 +17,11 @@ import scipy.linalg
 from measuring import print_table
 from underactuated import SCENES, problem_on
 
+from hovi.optimize.banded_model import BandModel
 from hovi.optimize.kkt_model import KktFactor, KktModel
 from hovi.optimize.quadratic_model import IntervalSum
-from hovi.planning.solver.constrained_action import ConstrainedAction
+from hovi.planning.solver.action_objective import ActionObjective
+from hovi.planning.solver.first_multipliers import least_squares_multipliers
 from hovi.planning.solver.solver import solve_on_grid
 
 Array = np.ndarray
@@ -35,10 +37,12 @@ def model_at_minimum(scene: str, scheme: str, intervals: int) -> KktModel:
     """The model at the minimum of a swing-up, with its multipliers."""
     problem = problem_on(scene, intervals, scheme)
     found = solve_on_grid(problem)
-    objective = ConstrainedAction(problem, found.trajectory.path)
-    none = np.zeros_like(objective.evaluate(found.trajectory.path).y)
-    multipliers = objective.model(found.trajectory.path, none).least_squares_multipliers()
-    return objective.model(found.trajectory.path, multipliers)
+    path = found.trajectory.path
+    known = least_squares_multipliers(problem, path)
+    action = ActionObjective(problem, "band", multipliers=known)
+    model = action.model(path, None, None)
+    assert isinstance(model, BandModel)
+    return action.kkt(path, model)
 
 
 def dense(model: KktModel) -> tuple[Array, Array]:
@@ -63,8 +67,8 @@ def with_saddles(model: KktModel, saddles: int) -> KktModel:
     for k in rng.choice(len(hessian) - 2, saddles, replace=False) + 1:
         hessian[k, -1, -1] -= 3.0 * np.abs(hessian[k, -1, -1]).max() * np.eye(hessian.shape[3])
     other = IntervalSum(own.gradient, hessian, own.metric)
-    y, band = np.zeros(model.equations), np.zeros(model.layout.plain.shape)
-    return KktModel(other, model.rows, y, model.layout, band, model.metric)
+    band = np.zeros(model.layout.plain.shape)
+    return KktModel(other, model.rows, model.layout, band, model.metric)
 
 
 def refined(solve: Solve, matrix: Array, size: float, rhs: Array) -> int | None:

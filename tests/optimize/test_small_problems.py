@@ -94,9 +94,9 @@ class Sliders:
         layout = BandLayout.of(self.numbers, self.scales)
         metric = np.broadcast_to(np.eye(m), (N, m, m)).copy()
         band = layout.assemble(metric[..., None, None] * np.eye(n))
-        wide, none = KktLayout.of(layout, rows), np.zeros(sum(each.size for each in rows))
+        wide = KktLayout.of(layout, rows)
         sums = IntervalSum(gradient, hessian, metric)
-        return KktModel(sums, rows, none, wide, band, wide.extended(band))
+        return KktModel(sums, rows, wide, band, wide.extended(band))
 
     def solved(self, rows: list[ConstraintRows]) -> tuple[Array, float, KktModel]:
         """The columns of the least effort where rows times them are zero, and the effort."""

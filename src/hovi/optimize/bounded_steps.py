@@ -213,7 +213,9 @@ class BoundedSteps(Generic[X]):
         whole = reacted - float(np.vdot(gradient, s))
         square = model.curvature(s) if model.equations else whole - trial.shift * norm2
         square -= float(np.vdot(weights * self.sigma, along.dy**2))
-        before, weight = barrier.merit(y, self.penalty, along, 0.0), 0.0
+        before = barrier.merit(y, self.penalty, along, 0.0)
+        missed = model.equations and not self.objective.satisfies_equations(self.ended.x)
+        weight = model.residual_weight(trial.factor) if missed else 0.0
 
         def decrease(fraction: float) -> float:
             # the merit function has the multipliers after the step
@@ -224,8 +226,9 @@ class BoundedSteps(Generic[X]):
         inside = along.primal >= 1.0  # a slack at the end of a whole step is kept off its bound
         longest = 1.0 if inside else barrier.boundary_fraction * along.primal
         fraction, predicted = longest, decrease(longest)
-        if predicted < -PREDICTED_NOISE * self.noise and self._misses_equations(model):
-            weight = self._weight(predicted, self._residual_decrease(longest, As))
+        if predicted < -PREDICTED_NOISE * self.noise and missed:
+            gain = self._residual_decrease(longest, As)
+            weight = self._weight(predicted - weight * gain, gain)
             predicted = decrease(longest)
         for shorter in SHORTER_FRACTIONS:
             if abs(predicted) <= PREDICTED_NOISE * self.noise or (
@@ -255,10 +258,6 @@ class BoundedSteps(Generic[X]):
         if not trial.newton:
             gradient = gradient + self.objective.pull(self.force - self.rho, model)
         return model.reaction(gradient, s, trial.factor)
-
-    def _misses_equations(self, model: QuadraticModel) -> bool:
-        """Whether there are equations that do not hold to their tolerances."""
-        return model.equations and not self.objective.satisfies_equations(self.ended.x)
 
     def _residual_decrease(self, fraction: float, As: Array) -> float:
         """The predicted decrease of |c|^2 / 2, to |c + fraction A s|^2 / 2.

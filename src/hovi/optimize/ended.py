@@ -64,8 +64,7 @@ class Iteration:
 
     value: the objective after the step. decrease: predicted by the model. ratio: actual over
         predicted decrease. shift: multiplier of the radius. radius: before the step.
-    residual: |c| of equations before the step. With these, decrease is |s.H s| / 2 + |z.c|, ratio
-        the fraction of the step that was taken, and radius the length of the whole step.
+    residual: |c| of equations before the step.
     """
 
     value: float

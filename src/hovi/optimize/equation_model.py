@@ -32,12 +32,14 @@ NORMAL = 0.8
 class EquationFactor:
     """A factorisation for steps that keep equations: A s = 0.
 
-    shift: of D. fraction: of c that the last step of the model takes away.
+    shift: of D. fraction: of c that the last step of the model takes away. weight: of |c|^2 / 2
+        with which a step that takes c away costs what it bends.
     """
 
     kkt: KktFactor
     shift: float
     fraction: float = 1.0
+    weight: float = 0.0
 
     def solve(self, rhs: Array) -> Array:
         """The step for a force that changes no equation."""
@@ -104,8 +106,17 @@ class EquationModel(_WithEquations):
             length = math.sqrt(max(float(n @ self.metric_product(n)), 0.0))
             factor.fraction = min(1.0, NORMAL * radius / length) if length > 0.0 else 1.0
             s, z = s - (1.0 - factor.fraction) * n, z - (1.0 - factor.fraction) * y
+            factor.weight = 2.0 * abs(float(y @ c)) / max(float(c @ c), np.finfo(float).tiny)
         slope = float(g @ s) + factor.fraction * float(z @ c)
         return s, slope, float(s @ self.metric_product(s))
+
+    def residual_weight(self, factor: Factor) -> float:
+        """See QuadraticModel.residual_weight.
+
+        n.(H + shift D) n is -y.c where a step n takes c away, and twice this is its weight |c|^2.
+        """
+        assert isinstance(factor, EquationFactor)
+        return factor.weight
 
     def reaction(self, gradient: Array, s: Array, factor: Factor) -> tuple[Array, Array]:
         """See QuadraticModel.reaction."""

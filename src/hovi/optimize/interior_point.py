@@ -132,8 +132,9 @@ def minimize_bounded(
     barrier = start.z or Barrier.central(objective.bounds, outputs.y, INITIAL_MU * density)
     ended = Ended(start.x, outputs, barrier)
     with ended.recorded_end(criteria.time_limit):
-        cold, warm = objective.radii
-        criteria = dataclasses.replace(criteria, radius=cold if start.z is None else warm)
+        if len(outputs.y) > 0:
+            cold, warm = objective.radii
+            criteria = dataclasses.replace(criteria, radius=cold if start.z is None else warm)
         _Iteration(objective, ended, criteria, density, report).run()
     return ended
 
@@ -177,6 +178,10 @@ class _Iteration(BoundedSteps[X]):
         while len(self.ended.steps) < self.criteria.max_iterations:
             between_steps(self.objective, self.ended.x)
             step = self.step(model)
+            if self._is_saddle(step):
+                self.ended.saddles.append(self.ended.value)
+                if not self._leave_saddle():
+                    return self._end(model)
             accepted = self._try(step, model)
             finished = self._finished(step, accepted)
             refined = (accepted or finished) and self._refined(at_end=finished)
@@ -216,7 +221,10 @@ class _Iteration(BoundedSteps[X]):
         if corrected is not None and corrected.merit < there.merit:
             there = corrected
         ratio, value = self._ratio(step, before, there), there.outputs.value
-        ended.steps.append(Iteration(value, step.decrease, ratio, trial.shift, self.radius))
+        residual = size_of(self.residual)
+        ended.steps.append(
+            Iteration(value, step.decrease, ratio, trial.shift, self.radius, residual)
+        )
         if self.report is not None:
             self.report(len(ended.steps), value)
         last, radius = self.radius, self.radius_after(step, ratio)
@@ -297,6 +305,12 @@ class _Iteration(BoundedSteps[X]):
         """End at a stationary point with its exact model."""
         self.ended.why, self.ended.model = Reason.STATIONARY, model
 
+    def _is_saddle(self, step: BoundedStep) -> bool:
+        """Whether the gradient is zero, and a step follows negative curvature alone."""
+        known = self.exact and self.ended.feasible and self.product <= LAST_PRODUCT * self.final_mu
+        satisfied = self.objective.satisfies_equations(self.ended.x)
+        return known and satisfied and step.trial.along_negative_curvature
+
     def _leave_saddle(self) -> bool:
         """Prepare for steps along negative curvature, which turned up at the end; False for none.
 
@@ -344,9 +358,12 @@ class _Iteration(BoundedSteps[X]):
         enough = max(self.criteria.decrease, self.criteria.enough) * self.scale()
         whole = accepted and step.fraction >= WHOLE_STEP
         small = max(step.remaining, step.decrease) <= enough
-        if not (last and whole and small and step.trial.newton and self.ended.feasible):
+        if not (last and whole and small and self.ended.feasible):
             return False
-        self.unmet = 0 if self.objective.satisfies_equations(self.ended.x) else self.unmet + 1
+        if self.objective.satisfies_equations(self.ended.x):
+            self.unmet = 0
+            return step.trial.newton
+        self.unmet += 1
         return self.unmet % MAX_UNMET == 0
 
     def _reduce_mu(self, step: BoundedStep) -> None:

@@ -17,23 +17,20 @@ from __future__ import annotations
 
 import itertools
 import math
-from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from functools import cached_property
-from typing import Generic, Self, TypeVar
+from typing import Self
 
 import numpy as np
 import numpy.typing as npt
 
 from hovi._native import band as native
 from hovi.optimize.banded_model import PANEL, BandLayout, BandModel, Runs, panel_rows
-from hovi.optimize.ended import Outputs
 from hovi.optimize.quadratic_model import IntervalSum
 from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]
-X = TypeVar("X")
 
 DELTA = 1e-8
 """delta, relative to |A|^2 / |H|, where |A| is that of a family of equations."""
@@ -243,24 +240,22 @@ class KktFactor:
 
 
 class KktModel:
-    """The gradient of f, the Hessian H of f + y.c, the Jacobian A of c, and the metric D.
+    """The gradient and the Hessian H of f + y.c, the Jacobian A of c, and the metric D.
 
-    slope: gradient of f. gradient: of f + y.c. metric: D as `KktLayout.extended` has it.
+    metric: D as `KktLayout.extended` has it.
     """
 
     def __init__(
         self,
         intervals: IntervalSum,
         rows: Sequence[ConstraintRows],
-        multipliers: Array,
         layout: KktLayout,
         metric_band: Array,
         metric: Array,
     ) -> None:
         self.rows, self.layout, self.metric = rows, layout, metric
         self.plain = BandModel(intervals, layout.plain, metric_band)
-        self.slope = self.plain.gradient
-        self.gradient = self.slope + self.transposed_product(multipliers)
+        self.gradient = self.plain.gradient
 
     @property
     def equations(self) -> int:
@@ -283,15 +278,6 @@ class KktModel:
             blocks = product.reshape(B, m, n, m, n).transpose(0, 1, 3, 2, 4)
             hessian[each.index, :m, :m] += blocks
         return self.layout.matrix(hessian, self.rows)
-
-    @cached_property
-    def _rows_alone(self) -> Array:
-        return self.layout.matrix(None, self.rows)
-
-    @cached_property
-    def normal_scale(self) -> float:
-        """Magnitude of A^T A relative to D."""
-        return self.largest_slope**2 / float(np.max(np.abs(self.metric), initial=1e-300))
 
     @property
     def curvature_scale(self) -> float:
@@ -331,12 +317,10 @@ class KktModel:
         )
         return factor if factor.negative == self.equations else None
 
-    def normal_factor(self, damping: float, delta: float | None = None) -> KktFactor:
-        """As `factor`, with damping D in place of H + shift D."""
-        if delta is not None:
-            return self._factored(self._rows_alone, damping, delta)
+    def normal_factor(self, damping: float) -> KktFactor:
+        """The factor with damping D in place of H."""
         small = DELTA * self._scale
-        return self._factored(self._rows_alone, damping, small, small)
+        return self._factored(self.layout.matrix(None, self.rows), damping, small, small)
 
     def exact_factor(self, shift: float = 0.0, delta: float = DELTA) -> KktFactor:
         """The factor of any inertia; refinement removes delta |A|^2 / |H| from its solutions."""
@@ -379,10 +363,6 @@ class KktModel:
             parts.append(np.matmul(rows.flat, own.reshape(*rows.flat.shape[::2], 1)).ravel())
         return np.concatenate(parts)
 
-    def transposed_product(self, y: Array) -> Array:
-        """A^T y."""
-        return self.plain.scatter(self.pulled_columns(y))
-
     def pulled_columns(self, y: Array) -> Array:
         """A^T y in the columns of the intervals, (N, m, n)."""
         columns = np.zeros(self.plain.intervals.gradient.shape)
@@ -396,10 +376,6 @@ class KktModel:
     def curvature(self, s: Array) -> float:
         """s.H s."""
         return self.plain.curvature(s)
-
-    def length(self, s: Array) -> float:
-        """|s| in the metric."""
-        return math.sqrt(max(float(np.vdot(s, self.plain.metric_product(s))), 0.0))
 
     def least_squares_multipliers(self) -> Array:
         """The change of y that makes the gradient smallest, in the norm of D^-1."""
@@ -424,32 +400,3 @@ def size_of(c: Array) -> float:
     with np.errstate(over="ignore", invalid="ignore"):
         square = float(np.dot(c, c))
     return math.sqrt(square) if math.isfinite(square) else math.inf
-
-
-class EqualityObjective(ABC, Generic[X]):
-    """An objective f under equations c = 0, on a manifold."""
-
-    @property
-    def negligible(self) -> float:
-        """Value that counts as none: decreases are relative to no smaller one."""
-        return 0.0
-
-    @abstractmethod
-    def evaluate(self, x: X) -> Outputs:
-        """f and c at x; not finite where they are not defined."""
-
-    @abstractmethod
-    def feasible(self, x: X) -> bool:
-        """Whether c = 0 holds at x to its tolerances."""
-
-    @abstractmethod
-    def model(self, x: X, multipliers: Array) -> KktModel:
-        """The second-order model of f + y.c at x."""
-
-    @abstractmethod
-    def retract(self, x: X, step: Array, model: KktModel) -> X:
-        """The point that a step of a model leads to."""
-
-    @abstractmethod
-    def relative_size(self, x: X, step: Array, model: KktModel) -> float:
-        """The largest component of a step relative to the size of the data."""

@@ -88,6 +88,10 @@ class QuadraticModel(ABC):
         slope = float(np.vdot(self.gradient, s))
         return s, slope, float(np.vdot(s, self.metric_product(s)))
 
+    def residual_weight(self, factor: Factor) -> float:
+        """The weight of |c|^2 / 2 with which the last step is measured; 0 for none."""
+        return 0.0
+
     def reaction(self, gradient: Array, s: Array, factor: Factor) -> tuple[Array, Array]:
         """Change of the multipliers of equations with a step s, and A s.
 

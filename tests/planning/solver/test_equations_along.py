@@ -10,8 +10,11 @@ import pytest
 import hovi
 from hovi.conditions.function import Curvature, Points, Slopes
 from hovi.discrete.grid import DiscretePath, Grid
+from hovi.optimize.banded_model import BandModel
+from hovi.optimize.kkt_model import KktModel
 from hovi.planning.problem.problem import TrajectoryProblem
-from hovi.planning.solver.constrained_action import ConstrainedAction
+from hovi.planning.solver.action_objective import ActionObjective
+from hovi.planning.solver.first_multipliers import first_multipliers
 from hovi.robot.loading import load_robot
 from hovi.schemes import galerkin
 from oracles.finite_differences import derivative
@@ -61,8 +64,7 @@ def problem_of(robot: hovi.Robot, *functions: object, r: int = 2) -> TrajectoryP
 
 def random_path(problem: TrajectoryProblem) -> DiscretePath:
     random, n = np.random.default_rng(4), problem.coordinates.nv
-    action = ConstrainedAction(problem, problem.guess("cubic")).action
-    path = action.problem.guess("cubic")
+    action, path = ActionObjective(problem, "band"), problem.guess("cubic")
     columns = random.uniform(-0.4, 0.4, (problem.grid.intervals, problem.ld.columns, n))
     model = action.model(path, None, None)
     return action.retract(path, model.scatter(columns), model)
@@ -82,17 +84,27 @@ def test_derivatives_of_a_function_without_casadi(two_link: hovi.Robot) -> None:
     require_exact_derivatives(problem_of(two_link, Product()))
 
 
+def lagrangian(problem: TrajectoryProblem, x: DiscretePath) -> ActionObjective:
+    """The action with multipliers of the equations, which are zero."""
+    return ActionObjective(problem, "band", multipliers=first_multipliers(problem, x))
+
+
+def kkt(action: ActionObjective, x: DiscretePath) -> KktModel:
+    model = action.model(x, None, None)
+    assert isinstance(model, BandModel)
+    return action.kkt(x, model)
+
+
 def require_exact_derivatives(problem: TrajectoryProblem) -> None:
     x, random = random_path(problem), np.random.default_rng(1)
-    objective = ConstrainedAction(problem, x)
-    c = objective.evaluate(x).y
-    multipliers = random.uniform(-1, 1, len(c))
-    model = objective.model(x, multipliers)
+    action = lagrangian(problem, x)
+    action.hold(random.uniform(-1, 1, len(action.residual(x))))
+    model = kkt(action, x)
     step = random.uniform(-0.1, 0.1, len(model.gradient))
 
     def along(t: Array) -> Array:
-        there = objective.evaluate(objective.retract(x, t[0] * step, model))
-        return np.append(there.y, there.value + multipliers @ there.y)
+        there = action.retract(x, t[0] * step, model.plain)
+        return np.append(action.residual(there), action.value(there))
 
     def slope(t: Array) -> Array:
         return derivative(lambda s: along(t + s), np.zeros(1))[-1]
@@ -113,10 +125,10 @@ def test_n_neg_is_that_of_the_reduced_hessian(case: str, twice: bool) -> None:
     problem = problem_of(load_robot(with_arm("planar")), *functions)
     x, found = random_path(problem), []
     for seed, size in ((0, 1.0), (1, 30.0), (2, 1e3)):
-        objective = ConstrainedAction(problem, x)
-        c = objective.evaluate(x).y
-        y = size * np.random.default_rng(seed).uniform(-1, 1, len(c))
-        model = objective.model(x, y)
+        action = lagrangian(problem, x)
+        c = action.residual(x)
+        action.hold(size * np.random.default_rng(seed).uniform(-1, 1, len(c)))
+        model = kkt(action, x)
         unit = np.eye(len(model.gradient))
         A = np.stack([model.jacobian_product(e) for e in unit], axis=1)
         square = np.array([model.curvature(e) for e in unit])

@@ -295,8 +295,7 @@ class ActionObjective(Objective[DiscretePath]):
             rows = [*rows, *bounds] or [ConstraintRows.none(*model.intervals.gradient.shape[1:])]
             layout = KktLayout.of(self.structure.layout, rows)
             wide = layout.extended(metric)
-        none = np.zeros(len(layout.multipliers))
-        return KktModel(model.intervals, rows, none, layout, metric, wide)
+        return KktModel(model.intervals, rows, layout, metric, wide)
 
     def residual(self, x: DiscretePath) -> Array:
         """c of the equations at x, (E,), none without multipliers; the last one is cached."""

@@ -5,7 +5,9 @@ from __future__ import annotations
 import math
 
 from hovi.discrete.grid import DiscretePath
+from hovi.optimize.banded_model import BandModel
 from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.equations import Equations
 from hovi.planning.solver.multipliers import Multipliers
 
@@ -23,6 +25,16 @@ def first_multipliers(problem: TrajectoryProblem, path: DiscretePath) -> Multipl
     if len(problem.passive) > 0:
         scale = math.sqrt(CONDITION_PENALTY * _cost(problem, path) / penalty)
     return Multipliers.zero(Equations(problem, scale))
+
+
+def least_squares_multipliers(problem: TrajectoryProblem, path: DiscretePath) -> Multipliers:
+    """Those that leave the least gradient: at a near minimum its own, up to its distance."""
+    action = ActionObjective(problem, "band", multipliers=first_multipliers(problem, path))
+    model = action.model(path, None, None)
+    assert isinstance(model, BandModel)
+    action.hold(action.kkt(path, model).least_squares_multipliers())
+    assert action.multipliers is not None
+    return action.multipliers
 
 
 def first_penalty(problem: TrajectoryProblem, path: DiscretePath) -> float:

@@ -65,6 +65,8 @@ def unfinished(why: Reason) -> tuple[Status, str]:
 
 def infeasible_sentence(reason: str, problem: TrajectoryProblem) -> str:
     """The message about a problem that no motion satisfies; reason: a clause."""
+    if not problem.limited:
+        return f"{reason}."
     within = problem.has_limits or bool(problem.bounds) or problem.distances is None
     place = "within the limits" if within else "that keeps its distances"
     return f"no motion {place} was found: {reason}."

@@ -39,7 +39,10 @@ from hovi.planning.solver.between_points import MarginsBetweenPoints
 from hovi.planning.solver.bounded_action import BoundedAction
 from hovi.planning.solver.central_path import CentralPath
 from hovi.planning.solver.condition_outputs import ConditionOutputs
-from hovi.planning.solver.first_multipliers import first_multipliers
+from hovi.planning.solver.first_multipliers import (
+    first_multipliers,
+    least_squares_multipliers,
+)
 from hovi.planning.solver.limits.limit_rows import LimitRows
 from hovi.planning.solver.limits.row_forces import by_segment, forces_of, joined
 from hovi.planning.solver.methods.method import Guess, Report
@@ -292,7 +295,8 @@ class BoundedSearch:
         """Known multipliers of the constraints, or first ones at a path; None without any."""
         if not self.problem.constrained:
             return None
-        return self.multipliers or first_multipliers(self.problem, path)
+        first = least_squares_multipliers if self.start.near else first_multipliers
+        return self.multipliers or first(self.problem, path)
 
     def minimized(self, objective: BoundedAction, start: Begun, criteria: Criteria) -> Bounded:
         """One solve of an objective. start: see minimize_bounded."""

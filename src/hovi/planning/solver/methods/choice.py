@@ -15,9 +15,6 @@ def all_methods() -> Iterator[ProblemMethod]:
     Each is imported when it is its turn: most problems need the first one only.
     """
     yield TrustRegion()
-    from hovi.planning.solver.methods.lagrange_newton import LagrangeNewton
-
-    yield LagrangeNewton()
     from hovi.planning.solver.methods.free_first import FreeFirst
 
     yield FreeFirst()

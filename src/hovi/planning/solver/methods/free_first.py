@@ -11,15 +11,12 @@ from hovi.planning.problem.contradictions import contradiction
 from hovi.planning.problem.limits import no_limits
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.answer import Answer
+from hovi.planning.solver.methods.choice import method_for
 from hovi.planning.solver.methods.interior_point import InteriorPoint
-from hovi.planning.solver.methods.lagrange_newton import LagrangeNewton
 from hovi.planning.solver.methods.method import Guess, ProblemMethod, Report
-from hovi.planning.solver.methods.trust_region import TrustRegion
 from hovi.planning.solver.status import Status, unfinished
 from hovi.system.deadline import Deadline
 
-WITHOUT_LIMITS: tuple[ProblemMethod, ...] = (TrustRegion(), LagrangeNewton())
-"""Methods for problems without limits."""
 SOLVED = Status.MINIMUM, Status.SADDLE
 """Statuses of motions that may be kept."""
 ENDED = Status.INFEASIBLE, Status.TIME_LIMIT, Status.INTERRUPTED
@@ -49,8 +46,7 @@ class FreeFirst(ProblemMethod):
         if known or contradiction(problem, no_limits(problem.coordinates)):
             return InteriorPoint().minimize(problem, start, criteria, report)
         deadline, free = Deadline(criteria.time_limit), problem.with_clearance(None)
-        method = next(method for method in WITHOUT_LIMITS if method.supports(free))
-        found = method.minimize(free, start, criteria, report)
+        found = method_for(free).minimize(free, start, criteria, report)
         found = dataclasses.replace(found, problem=problem)
         if found.status in ENDED:
             return found

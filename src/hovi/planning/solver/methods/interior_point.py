@@ -24,6 +24,7 @@ from hovi.planning.solver.status import (
     diverged,
     infeasible_sentence,
     saddle_in_words,
+    status_of,
     unfinished,
 )
 from hovi.system.dataclass import dataclass
@@ -44,11 +45,8 @@ class InteriorPoint(ProblemMethod):
     method: Method | None = None
 
     def supports(self, problem: TrajectoryProblem) -> bool:
-        """Problems with limits or obstacles, with or without equality constraints.
-
-        By another method, all problems without distances to obstacles or between links.
-        """
-        return problem.limited if self.method is None else problem.distances is None
+        """All problems; by another method, those without distances of obstacles or links."""
+        return self.method is None or problem.distances is None
 
     def minimize(
         self,
@@ -88,6 +86,9 @@ def _searched(search: BoundedSearch) -> Answer:
         status, message = Status.DIVERGED, diverged(broken, nit)
     elif reason:
         status, message = Status.INFEASIBLE, infeasible_sentence(reason, problem)
+    elif not problem.limited:
+        status, message = status_of(problem, ended, value, nit, n_neg)
+        message += "" if status is Status.MINIMUM else missed_sentence(problem, x)
     elif ended.why is not Reason.STATIONARY:
         status, message = _unfinished(ended.why, nit, value)
         message += missed_sentence(problem, x) if problem.constrained else ""
@@ -98,9 +99,9 @@ def _searched(search: BoundedSearch) -> Answer:
     instants, forces, prices = None, None, None
     if ended.why not in (*STOPPED, Reason.DIVERGED):  # or rows may be of a later attempt
         instants, forces = search.forces(ended)
-        prices = search.prices(ended)
+        prices = search.prices(ended) if problem.limited else None
     history, central, solved = search.history, None, None
-    if status is Status.MINIMUM:
+    if status is Status.MINIMUM and problem.limited:
         central, solved = search.central_path(ended), search.solved_bounds(ended)
     known = value, status, message, nit, n_neg, history, forces, instants, prices
     return Answer(problem, x, *known, central=central, solved_bounds=solved)
