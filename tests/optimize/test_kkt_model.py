@@ -300,8 +300,8 @@ def test_a_correction_takes_away_what_is_left_beyond_the_linearised_residual() -
         factor = steps.factor(shift)
         assert factor is not None
         steps.descend(factor, 0.3)
-        more = steps.correction(factor, taken, left)
         wanted = (1.0 - taken * factor.fraction) * steps.residual
+        more = steps.correction(factor, left - wanted)
         np.testing.assert_allclose(left + A @ more, wanted, atol=1e-9)
 
 
@@ -352,7 +352,7 @@ def test_newton_steps_with_one_more_unknown_solve_its_kkt_system(room: tuple[flo
     decrease = -model.gradient @ step - 0.5 * step @ H @ step
     assert -0.5 * slope == pytest.approx(decrease, rel=1e-4)
     assert model.curvature(step) == pytest.approx(step @ H @ step, rel=1e-9)
-    more = model.correction(factor, 1.0, residual)
+    more = model.correction(factor, residual)
     assert more[-1] == 0.0
     np.testing.assert_allclose(A @ more, -residual, atol=1e-9)
     left = H[:-1] @ step + A[:, :-1].T @ z + model.gradient[:-1]

@@ -139,11 +139,11 @@ class BorderedModel(QuadraticModel):
         x, t = s[: self.size], s[self.size :]
         return self.inner.reaction(gradient[: self.size] + self.border.columns @ t, x, factor.inner)
 
-    def correction(self, factor: Factor, taken: float, residual: Array) -> Array:
+    def correction(self, factor: Factor, missed: Array) -> Array:
         """That of the inner model."""
         assert isinstance(factor, BorderedFactor)
         still = np.zeros_like(self.border.slope)
-        return np.append(self.inner.correction(factor.inner, taken, residual), still)
+        return np.append(self.inner.correction(factor.inner, missed), still)
 
     def curvature(self, s: Array) -> float:
         """s.H s, of the bordered H."""

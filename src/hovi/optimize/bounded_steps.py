@@ -84,6 +84,7 @@ class BoundedStep:
     barrier: of the current point, with the mu that the step aims at. before: its merit there.
     targets: of the products of multipliers and gaps.
     reaction: change of the multipliers of equations that goes with it; None without any.
+    taken: change A s of equations to first order, with the whole step, (E,).
     weight: of |c|^2 / 2 in the merit function.
     """
 
@@ -95,8 +96,9 @@ class BoundedStep:
     barrier: Barrier
     before: float
     targets: Pair
-    reaction: Array | None = None
-    weight: float = 0.0
+    reaction: Array | None
+    taken: Array
+    weight: float
 
 
 class BoundedSteps(Generic[X]):
@@ -226,7 +228,7 @@ class BoundedSteps(Generic[X]):
         inside = along.primal >= 1.0  # a slack at the end of a whole step is kept off its bound
         longest = 1.0 if inside else barrier.boundary_fraction * along.primal
         fraction, predicted = longest, decrease(longest)
-        if predicted < -PREDICTED_NOISE * self.noise and missed:
+        if predicted < 0.0 and missed:
             gain = self._residual_decrease(longest, As)
             weight = self._weight(predicted - weight * gain, gain)
             predicted = decrease(longest)
@@ -242,7 +244,7 @@ class BoundedSteps(Generic[X]):
         trial = trial._replace(step=s, norm=math.sqrt(max(norm2, 0.0)))
         if weight > 0.0:
             before += 0.5 * weight * float(self.residual @ self.residual)
-        ends = barrier, before, targets, change, weight
+        ends = barrier, before, targets, change, As, weight
         return BoundedStep(trial, along, fraction, predicted, 0.5 * whole, *ends)
 
     def _reaction(

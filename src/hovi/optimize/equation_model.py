@@ -124,11 +124,10 @@ class EquationModel(_WithEquations):
         c = self.residual if factor.shift == 0.0 else np.zeros_like(self.residual)
         return factor.kkt.solve(-gradient, -c)[1], self.kkt.jacobian_product(s)
 
-    def correction(self, factor: Factor, taken: float, residual: Array) -> Array:
+    def correction(self, factor: Factor, missed: Array) -> Array:
         """See QuadraticModel.correction."""
         assert isinstance(factor, EquationFactor)
-        target = (1.0 - taken * factor.fraction) * self.residual - residual
-        return factor.kkt.solve(np.zeros_like(self.gradient), target)[0]
+        return factor.kkt.solve(np.zeros_like(self.gradient), -missed)[0]
 
     def negative_eigenvalues(self, border: tuple[Array, Array] | None = None) -> int:
         """Number of negative eigenvalues of H, or [H B; B^T C], on the tangent space A s = 0."""

@@ -17,8 +17,9 @@ step fails, mu stays until its problem is solved. [WaechterBiegler2006; NocedalW
 
 Steps satisfy equations c = 0 to first order, A s = -c, or a fraction of c where the trust region
 shortens them, and their multipliers change with every step (hovi.optimize.equation_model). Progress
-is then measured with the multipliers after the step, and by |c|^2 where that would be none. A step
-whose merit falls by less than half of what it predicts is corrected for the curvature of c.
+is then measured with the multipliers after the step, and by |c|^2 as what takes c away costs, or
+more where that would be none. A step whose merit falls by less than half of what it predicts is
+corrected for the curvature of c, and refused where that undoes what it gained or does not help.
 
 Where the Hessian is indefinite, the objective may give a model without the negative curvature of
 outputs, with which mu falls sooner. At a stationary point, and from there on, the model is exact:
@@ -105,10 +106,15 @@ DENSITY_FLOOR = 1e-9
 MAX_FORCE = 1e12
 """Multiplier, relative to the mean density, above which the bounds are taken as impossible."""
 MAX_STALLED_STEPS = 12
-"""Consecutive refused steps after which the iteration ends as diverged."""
+"""Consecutive steps that are refused, or that could take little of c away while it does not fall,
+after which the iteration ends as diverged."""
 CURVED = 0.5
 """Ratio of the actual and the predicted decrease below which a step under equations is corrected
 for their curvature."""
+CORRECTED = 0.5
+"""Part that a correction may leave of what a step misses of c; the step is refused otherwise."""
+LITTLE = 0.99
+"""Part of c that is left where steps take little of it away."""
 MAX_UNMET = 4
 """Steps that predict next to nothing after which a solve ends although equations do not hold."""
 MAX_SADDLES = 5
@@ -162,7 +168,8 @@ class _Iteration(BoundedSteps[X]):
     ) -> None:
         super().__init__(objective, ended, criteria, density)
         self.report = report
-        self.stalled = self.unmet = 0
+        self.stalled = self.unmet = self.idle = 0
+        self.first_residual = math.inf
         self.level = FIRST_REFINEMENT
         self.refinements = self.reopenings = self.saddles = 0
         self.first_product = 0.0
@@ -182,6 +189,7 @@ class _Iteration(BoundedSteps[X]):
                 self.ended.saddles.append(self.ended.value)
                 if not self._leave_saddle():
                     return self._end(model)
+            self._count_idle(step)
             accepted = self._try(step, model)
             finished = self._finished(step, accepted)
             refined = (accepted or finished) and self._refined(at_end=finished)
@@ -218,7 +226,7 @@ class _Iteration(BoundedSteps[X]):
         except BaseException:  # the multipliers stay those of the current point
             self._let_go(step)
             raise
-        if corrected is not None and corrected.merit < there.merit:
+        if corrected is not None and not there.merit < corrected.merit < before:
             there = corrected
         ratio, value = self._ratio(step, before, there), there.outputs.value
         residual = size_of(self.residual)
@@ -274,18 +282,23 @@ class _Iteration(BoundedSteps[X]):
     ) -> _Reached[X] | None:
         """Where a step leads with its second-order correction, if equations curve too much.
 
-        None if they do not, or if the corrected step leaves the bounds.
+        None if they do not, or if the corrected step leaves the bounds. The merit is infinite where
+        they curve so much that the correction is of no use.
         """
         poor = self._ratio(step, before, there) < CURVED and math.isfinite(there.merit)
         if step.reaction is None or not poor or step.fraction == 0.0:
             return None
-        residual = self.objective.residual(there.x)
-        more = model.correction(step.trial.factor, step.fraction, residual)
+        expected = self.residual + step.fraction * step.taken
+        missed = self.objective.residual(there.x) - expected
+        more = model.correction(step.trial.factor, missed)
         dy = step.along.dy + self.objective.push(more, model) / step.fraction
         along = step.barrier.aim(self.ended.outputs.y, dy, step.targets)
         if along.primal < 1.0 and step.barrier.boundary_fraction * along.primal < step.fraction:
             return None
-        return self._reached(step, along, there.step + more, model)
+        reached = self._reached(step, along, there.step + more, model)
+        left = self.objective.residual(reached.x) - expected
+        corrected = size_of(left) < CORRECTED * size_of(missed)
+        return reached if corrected else reached._replace(merit=math.inf)
 
     def _let_go(self, step: BoundedStep) -> None:
         """Take the change of the multipliers of equations back that goes with a step."""
@@ -319,9 +332,19 @@ class _Iteration(BoundedSteps[X]):
         self.saddles, self.stalled = self.saddles + 1, 0
         return self.criteria.escape_saddles and self.saddles <= MAX_SADDLES
 
+    def _count_idle(self, step: BoundedStep) -> None:
+        """Count steps in a row that could take little of c away, while it has not fallen either."""
+        size = size_of(self.residual)
+        moving = size_of(self.residual + step.taken) <= LITTLE * size
+        if moving or size <= LITTLE * self.first_residual:
+            self.idle, self.first_residual = 0, size
+        else:
+            self.idle += 1
+
     def _is_hopeless(self) -> bool:
-        """Whether the bounds seem impossible to satisfy from here."""
-        return self.stalled >= MAX_STALLED_STEPS or self.penalty > MAX_FORCE * self.density
+        """Whether bounds or equations seem impossible to satisfy from here."""
+        stalled = max(self.stalled, self.idle) >= MAX_STALLED_STEPS
+        return stalled or self.penalty > MAX_FORCE * self.density
 
     def _reopened(self) -> bool:
         """Whether the slacks were moved away from their bounds again, to go on from there."""

@@ -99,10 +99,10 @@ class QuadraticModel(ABC):
         """
         raise NotImplementedError
 
-    def correction(self, factor: Factor, taken: float, residual: Array) -> Array:
-        """A step that takes away what the residual after a fraction of the last one is too large.
+    def correction(self, factor: Factor, missed: Array) -> Array:
+        """A step that takes away what the residual is too large after the last one, (E,).
 
-        It is the second-order correction of that step. taken: the fraction.
+        It is the second-order correction of that step.
         """
         raise NotImplementedError
 

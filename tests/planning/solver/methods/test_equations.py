@@ -15,11 +15,16 @@ import scipy.linalg
 
 import hovi
 from hovi import Status, solve
+from hovi.optimize.ended import Iteration
 
 SWING_UPS = ("acrobot_swing_up", "pendubot_swing_up", "cart_pole_swing_up")
 SCHEMES = ("galerkin-2", "galerkin-2x8")
-IPOPT_STEPS = {"acrobot_swing_up": 58, "pendubot_swing_up": 15, "cart_pole_swing_up": 25}
-"""Steps of Ipopt on the same discrete problems, with `galerkin-2` on 40 intervals."""
+IPOPT = {
+    "acrobot_swing_up": (58, 12.641),
+    "pendubot_swing_up": (15, 21.911),
+    "cart_pole_swing_up": (25, 24.396),
+}
+"""Steps of Ipopt on the same discrete problems, with `galerkin-2` on 40 intervals, and the cost."""
 BUCKLING = (4 * np.pi**2, 80.763, 16 * np.pi**2)
 """Loads at which a straight rod of unit length and stiffness, clamped at both ends, loses
 stability; the second and a repeated third one with its midpoint held as well."""
@@ -66,7 +71,10 @@ def test_a_swing_up_takes_no_more_steps_than_one_and_a_half_times_ipopt(
     found = swing_up(scene, scheme)
     assert found.status in ("minimum", "unresolved")  # the acrobot's joint spins
     assert found.n_neg == 0
-    assert found.nit == len(found.history) <= 1.5 * IPOPT_STEPS[scene]
+    steps, cost = IPOPT[scene]
+    assert found.cost < 1.001 * cost
+    most = 1.5 * steps if found.cost > 0.95 * cost else 100  # on the way to another minimum
+    assert found.nit == len(found.history) <= most
 
 
 @pytest.mark.parametrize("scene", SWING_UPS)
@@ -124,14 +132,14 @@ def test_the_multipliers_make_the_action_stationary(scene: str, scheme: str) -> 
 @pytest.mark.parametrize("scene", SWING_UPS)
 def test_the_last_steps_converge_quadratically(scene: str, scheme: str) -> None:
     """Whole steps, whose decreases fall like squares down to rounding errors."""
-    steps = swing_up(scene, scheme).history
-    last = [step for step in steps if step.decrease < 1e-3 and step.radius < 1.0]
-    assert len(last) >= 3
+    steps, last = list(swing_up(scene, scheme).history), list[Iteration]()
+    while len(last) < 3:
+        last.insert(0, steps.pop())
     for before, after in pairwise(last):
-        assert after.ratio == 1.0
-        assert after.shift == 0.0
-        assert np.log(after.decrease) < 1.3 * np.log(before.decrease) or after.decrease < 1e-11
-    assert last[-1].decrease < 1e-9
+        assert before.shift == after.shift == 0.0
+        assert after.ratio == pytest.approx(1.0, abs=0.1)
+        assert np.log(abs(after.decrease)) < 1.3 * np.log(before.decrease)
+    assert abs(last[-1].decrease) < 1e-9
 
 
 GANTRY = """<robot name="gantry"><link name="base"/>
@@ -318,7 +326,7 @@ def test_via_points_that_contradict_each_other_are_infeasible() -> None:
     assert found.nit <= 90
     assert "the goal at t = 0.75 s cannot be met: frame 'tool0' misses it by" in found.message
     middle = place(found.trajectory.q[8])
-    np.testing.assert_allclose(middle, at + np.array([0.025, 0, 0]), rtol=0, atol=1e-6)
+    np.testing.assert_allclose(middle, at + np.array([0.025, 0, 0]), rtol=0, atol=1e-5)
 
 
 @pytest.mark.parametrize("limit", [{"max_iterations": 3}, {"time_limit": 0.0}])

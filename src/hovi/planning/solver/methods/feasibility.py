@@ -120,7 +120,7 @@ def _shift(search: BoundedSearch, path: DiscretePath, moved: DiscretePath) -> fl
         factor = model.factor(0.0)
         if factor is None:
             return math.inf
-        change += objective.push(model.correction(factor, 1.0, residual), model)
+        change += objective.push(model.correction(factor, residual), model)
     return float(np.max(np.abs(change), initial=0.0))
 
 
