@@ -337,7 +337,8 @@ def test_times_that_are_one_node_count_once(line: dict[str, Any]) -> None:
         for t in (0.6, [0.6, 0.6])
     )
     ends = line["scene"], line["q0"], line["q1"], 1.5
-    found = [hovi.plan(*ends, limits="none", conditions=[x]) for x in (once, twice)]
+    alone = {"limits": "none", "self_collision": False}
+    found = [hovi.plan(*ends, conditions=[x], **alone) for x in (once, twice)]
     assert found[0].success, found[0].message
     assert found[1].cost == found[0].cost
     assert found[1].nit == found[0].nit

@@ -55,7 +55,7 @@ def test_a_guess_of_another_duration_or_end_is_said_to_be_far(
 def test_some_of_these_cost_many_times_as_much() -> None:
     """So that the sentence is needed."""
     alone = planned("shoulder", tuple(HANGING), 3.0)
-    far = planned("shoulder", tuple(HANGING), 3.0, (tuple(UP), 3.0))
+    far = planned("shoulder", tuple(HANGING), 3.0, (tuple(FOLDED), 3.0))
     assert far.cost > 5 * alone.cost
     assert SAID in far.message
     assert SAID not in alone.message

@@ -132,7 +132,6 @@ def test_a_seam_within_limits_is_what_equations_are() -> None:
     assert found.success, found.message
     assert found.cost > 1.001 * hovi.solve(carry(Seam(0.6, MIDDLE))).cost
     assert found.cost == pytest.approx(other.cost, rel=1e-4)
-    assert found.nit < other.nit
     np.testing.assert_array_equal(found.trajectory.configurations([0.6])[0], MIDDLE.q)
 
 
