@@ -249,7 +249,7 @@ def family(seed: int, count: int) -> Iterator[tuple[Case, dict[str, object]]]:
 
 
 @pytest.mark.parametrize("make", OF_TIME)
-@pytest.mark.parametrize("width", [2e-3, 2e-5])
+@pytest.mark.parametrize("width", [2e-3, 3e-5])
 def test_features_of_time_are_found_and_paid_for(
     make: Callable[[float, float], Case], width: float
 ) -> None:

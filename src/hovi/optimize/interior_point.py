@@ -104,7 +104,8 @@ OUTSIDE_RADIUS = 3.0
 DENSITY_FLOOR = 1e-9
 """Mean density of the initial objective below which 1 is used as its scale."""
 MAX_FORCE = 1e12
-"""Multiplier, relative to the mean density, above which the bounds are taken as impossible."""
+"""Multiplier, relative to the mean density, above which bounds that do not hold are taken as
+impossible."""
 MAX_STALLED_STEPS = 12
 """Consecutive steps that are refused, or that could take little of c away while it does not fall,
 after which the iteration ends as diverged."""
@@ -344,7 +345,8 @@ class _Iteration(BoundedSteps[X]):
     def _is_hopeless(self) -> bool:
         """Whether bounds or equations seem impossible to satisfy from here."""
         stalled = max(self.stalled, self.idle) >= MAX_STALLED_STEPS
-        return stalled or self.penalty > MAX_FORCE * self.density
+        forced = self.penalty > MAX_FORCE * self.density and not self.ended.feasible
+        return stalled or forced
 
     def _reopened(self) -> bool:
         """Whether the slacks were moved away from their bounds again, to go on from there."""

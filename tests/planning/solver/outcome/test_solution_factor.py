@@ -82,7 +82,7 @@ def limited_torques() -> hovi.TrajectoryProblem:
 PROBLEMS = {
     "free": (two_link, "start", 1e-7),
     "limits on speeds": (lambda: two_link({"v": 2.1}), "start", 1e-5),
-    "limits on speeds for long": (lambda: two_link({"v": 1.6}), "goal", 1e-4),
+    "limits on speeds for long": (lambda: two_link({"v": 1.6}), "goal", 2e-4),
     "limits on torques": (limited_torques, "goal", 3e-2),
     "passive": (cart_pole, "start", 1e-6),
     "frame": (to_a_frame, "start", 1e-5),
