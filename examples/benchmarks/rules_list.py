@@ -397,18 +397,39 @@ _rule(
 _at("equations", "optimize.interior_point")
 _rule(
     "corrections for curved equations",
-    "Within limits a step whose merit falls by less than half of what it predicts is corrected.",
+    "A step whose merit falls by less than half of what it predicts is corrected.",
     "_Iteration._corrected_step",
     "self._ratio(step, before, there) < CURVED",
     "False",
+)
+_rule(
+    "steps that equations bend too far",
+    "A step is refused whose correction leaves more than half of what it misses of c.",
+    "_Iteration._corrected_step",
+    "size_of(left) < CORRECTED * size_of(missed)",
+    "True",
+)
+_rule(
+    "what a correction undoes",
+    "A step is refused whose correction costs more than the step gained.",
+    "_Iteration._try",
+    "there.merit < corrected.merit < before",
+    "there.merit < corrected.merit",
+)
+_rule(
+    "steps that take little of c away",
+    "Where twelve steps in a row could take next to nothing of c away, a solve has failed.",
+    "_Iteration._count_idle",
+    "moving or size <= LITTLE * self.first_residual",
+    "True",
 )
 _at("equations", "optimize.bounded_steps")
 _rule(
     "weight of the residual",
     "A step under equations that predicts no decrease gets one by a weight of |c|^2.",
     "BoundedSteps._shortened",
-    "self._weight(predicted, self._residual_decrease(longest, As))",
-    "0.0",
+    "self._weight(predicted - weight * gain, gain)",
+    "weight",
 )
 _rule(
     "multipliers without the barrier",
@@ -418,6 +439,13 @@ _rule(
     "0.0",
 )
 _at("equations", "optimize.equation_model")
+_rule(
+    "curvature of what takes c away",
+    "Shortened steps are measured by |c|^2 with the curvature of what takes c away.",
+    "EquationModel.residual_weight",
+    "factor.weight",
+    "0.0",
+)
 _rule(
     "least-squares multipliers of shortened steps",
     "A step that is kept within a radius has the multipliers of one that keeps c.",
@@ -440,50 +468,13 @@ _rule(
     "len(residual) > 0",
     "False",
 )
-_at("equations", "optimize.lagrange_newton")
-_rule(
-    "second-order corrections",
-    "A whole step that does not halve the residual is corrected by it.",
-    "_Search._search_along",
-    "fraction == 1.0 and size >= 0.5 * self.size and math.isfinite(size)",
-    "False",
-)
-_rule(
-    "restoration",
-    "Where no share of a step is accepted, the residual alone is made smaller.",
-    "_Search._restore",
-    "self.restorations > MAX_RESTORATIONS",
-    "True",
-)
-_rule(
-    "decrease decides where equations hold",
-    "Where the residual is small, a step has to decrease the cost by Armijo's rule.",
-    "_Search._accepted",
-    "fraction * min(-slope, LARGE_SLOPE) ** 2.3 > before**1.1",
-    "False",
-)
-_at("equations", "optimize.restoration")
-_rule(
-    "curvature of the residual",
-    "After a Gauss-Newton step that failed, restoration takes Newton steps.",
-    "restore",
-    "_newton_step",
-    "_step",
-)
-_at("equations", "planning.solver.methods.lagrange_newton")
-_rule(
-    "a penalty before Lagrange-Newton",
-    "With equations at nodes alone a rough minimisation with a penalty comes first.",
-    "_minimized",
-    "begin.z is not None or objective.problem.along or len(objective.problem.passive) > 0",
-    "True",
-)
+_at("equations", "planning.solver.methods.bounded_search")
 _rule(
     "least-squares multipliers of a near guess",
     "A guess near a minimum begins with least-squares multipliers.",
-    "_minimized",
-    "_multipliers(start, objective)",
-    "None",
+    "BoundedSearch.known_multipliers",
+    "self.start.near",
+    "False",
 )
 _at("warm starts", "planning.solver.methods.bounded_search")
 _rule(

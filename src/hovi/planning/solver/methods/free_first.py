@@ -11,9 +11,9 @@ from hovi.planning.problem.contradictions import contradiction
 from hovi.planning.problem.limits import no_limits
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.answer import Answer
-from hovi.planning.solver.methods.choice import method_for
 from hovi.planning.solver.methods.interior_point import InteriorPoint
 from hovi.planning.solver.methods.method import Guess, ProblemMethod, Report
+from hovi.planning.solver.methods.trust_region import TrustRegion
 from hovi.planning.solver.status import Status, unfinished
 from hovi.system.deadline import Deadline
 
@@ -46,7 +46,8 @@ class FreeFirst(ProblemMethod):
         if known or contradiction(problem, no_limits(problem.coordinates)):
             return InteriorPoint().minimize(problem, start, criteria, report)
         deadline, free = Deadline(criteria.time_limit), problem.with_clearance(None)
-        found = method_for(free).minimize(free, start, criteria, report)
+        method = TrustRegion() if TrustRegion().supports(free) else InteriorPoint()
+        found = method.minimize(free, start, criteria, report)
         found = dataclasses.replace(found, problem=problem)
         if found.status in ENDED:
             return found
