@@ -30,10 +30,7 @@ KEPT = 1e-6
 
 
 class Reason(StrEnum):
-    """Why a minimisation ended.
-
-    INFEASIBLE: the residual of the equations has a minimum there that is not zero.
-    """
+    """Why a minimisation ended."""
 
     STATIONARY = "stationary"
     ITERATION_LIMIT = "iteration_limit"
@@ -41,7 +38,6 @@ class Reason(StrEnum):
     INTERRUPTED = "interrupted"
     DIVERGED = "diverged"
     STALLED = "stalled"
-    INFEASIBLE = "infeasible"
 
 
 STOPPED = Reason.TIME_LIMIT, Reason.INTERRUPTED
@@ -96,7 +92,7 @@ class Ended(Generic[X, Z]):
     """The final point, its multipliers, and why the iteration ended; the current ones before.
 
     x, outputs: the point, with the objective and what is constrained there.
-    z: multipliers of equations, shape (E,); slacks and multipliers of bounds; None without either.
+    z: slacks and multipliers of bounds; None without any.
     steps: one record per step that was tried.
     model: the last quadratic model, of a stationary point. convex: whether that was exact, with a
         Hessian that is positive definite, under equations on their tangent space.

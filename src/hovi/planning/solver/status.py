@@ -54,7 +54,6 @@ _UNFINISHED = {
     Reason.TIME_LIMIT: (Status.TIME_LIMIT, "the time limit was reached"),
     Reason.INTERRUPTED: (Status.INTERRUPTED, "the solve was interrupted"),
     Reason.DIVERGED: (Status.DIVERGED, "no step decreases the cost"),
-    Reason.INFEASIBLE: (Status.DIVERGED, "no step decreases the cost"),
 }
 
 
@@ -84,7 +83,7 @@ def status_of(
 
     cost: with the price of time. nit: number of all its iterations.
     """
-    if ended.why in (Reason.DIVERGED, Reason.INFEASIBLE):
+    if ended.why is Reason.DIVERGED:
         reason = non_finite_sentence(problem, ended.x)
         if reason:
             return Status.DIVERGED, diverged(reason, nit)

@@ -34,7 +34,7 @@ from hovi.optimize.start import Start
 from hovi.planning.problem.limits import no_limits
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.bounded_action import BoundedAction
-from hovi.planning.solver.first_multipliers import first_multipliers
+from hovi.planning.solver.first_multipliers import least_squares_multipliers
 from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
@@ -124,9 +124,6 @@ class SolutionFactor:
         outputs = objective.outputs(path)
         barrier = known.barrier if known else Barrier.inactive(objective.bounds, outputs.y)
         model = _exact_model(objective, path, barrier.multipliers)
-        if known is None and problem.constrained:
-            objective.hold(objective.action.kkt(path, model).least_squares_multipliers())
-            model = _exact_model(objective, path, barrier.multipliers)
         active, strictness = _active(barrier, outputs.density(objective.bounds.measure))
         rows = _rows_of(objective, model, np.flatnonzero(active))
         system = objective.action.kkt(path, model, rows)
@@ -232,8 +229,8 @@ class SolutionFactor:
 
 
 def _unlimited(problem: TrajectoryProblem, path: DiscretePath) -> BoundedAction:
-    """The objective of a problem without limits, with multipliers of equations that are zero."""
-    known = first_multipliers(problem, path) if problem.constrained else None
+    """The objective of a problem without limits, with multipliers of equations at a motion."""
+    known = least_squares_multipliers(problem, path) if problem.constrained else None
     return BoundedAction(problem, no_limits(problem.coordinates), multipliers=known)
 
 
