@@ -32,6 +32,7 @@ class Rule:
 
 
 NOTICED = {
+    "middle first": "test_a_narrow_room_is_used_and_held",
     "steps that take little of c away": "test_a_swing_up_in_one_interval_has_no_solution",
     "steps that equations bend too far": "test_both_hands_of_baxter_reach_their_poses",
     "reopen slacks": "test_example_runs_headless[06_seven_joints]",
@@ -475,6 +476,14 @@ _rule(
     "A guess near a minimum begins with least-squares multipliers.",
     "BoundedSearch.known_multipliers",
     "self.start.near",
+    "False",
+)
+_at("equations", "planning.solver.methods.middle_first")
+_rule(
+    "middle first",
+    "What is kept within a narrow room is kept in its middle first.",
+    "MiddleFirst.supports",
+    "has_values",
     "False",
 )
 _at("warm starts", "planning.solver.methods.bounded_search")

@@ -49,6 +49,7 @@ class Condition(Generic[Values, Place]):
     where: hovi.AtTimes(times) for a value at some times; left out for all times.
     name: in messages. unit: of y, in messages. of: names of its entries there, such as joints.
     read: of a value of y what messages say, in that unit: such as the root, where y is a square.
+    middle: of narrow bounds, the values between them, with which a solve begins.
     scale: of bounded y, one number or one for each entry: by default upper - lower, or
         max(1, |bound|) of a single bound. Bounds that are functions of time need it.
     tolerance: at least 1e-6: the fraction of the scale by which a bound may be exceeded anywhere;
@@ -70,6 +71,7 @@ class Condition(Generic[Values, Place]):
     of: Sequence[str] = ()
     during: tuple[float, float] | None = None
     read: Callable[[float], float] | None = None
+    middle: Condition[Any, Any] | None = None
 
     def __post_init__(self) -> None:
         if not (isinstance(self.function, str | Function) or callable(self.function)):
@@ -98,6 +100,10 @@ class Condition(Generic[Values, Place]):
             raise InputError(
                 f"condition {self.name!r} has a value: leave its `scale` out, which is that of "
                 "bounds, and at given times its `tolerance`, or use a hovi.Between."
+            )
+        if self.middle is not None and not isinstance(self.middle.on, Equal):
+            raise InputError(
+                f"the middle of condition {self.name!r} must be a condition with a hovi.Equal."
             )
         if self.scale is not None:
             scale = numbers_of(f"the scale of condition {self.name!r}", self.scale)
@@ -137,7 +143,16 @@ class Condition(Generic[Values, Place]):
             return self
         on: Any = self.on.from_time(time)
         part = self.during and (self.during[0] - time, self.during[1] - time)
-        return dataclasses.replace(self, function=self.y.from_time(time), on=on, during=part)
+        middle = self.middle and self.middle.from_time(time)
+        changes: dict[str, Any] = {"function": self.y.from_time(time), "middle": middle}
+        return dataclasses.replace(self, on=on, during=part, **changes)
+
+    @property
+    def centered(self) -> Condition[Any, Any]:
+        """The values between narrow bounds; itself without these."""
+        if self.middle is None:
+            return self
+        return dataclasses.replace(self.middle, name=self.name, during=self.during)
 
     def holds_at(self, t: Array) -> Mask:
         """Where it holds, at times in [s] that are no nodes of a grid: shape of t."""
@@ -213,7 +228,8 @@ def with_function(
             f"condition {given.name!r} needs {y.size} names in `of`, one for each value of its "
             f"function, got {len(given.of)}."
         )
-    return dataclasses.replace(given, function=y, where=where)
+    middle = given.middle and with_function(given.middle, coordinates)
+    return dataclasses.replace(given, function=y, where=where, middle=middle)
 
 
 def _along(given: Condition[Equal | Between, Where], y: Function, on: Coordinates) -> Along:

@@ -335,10 +335,9 @@ class _Iteration(BoundedSteps[X]):
 
     def _count_idle(self, step: BoundedStep) -> None:
         """Count steps in a row that could take little of c away, while it has not fallen either."""
-        if step.reaction is None:
-            return
         size = size_of(self.residual)
-        moving = size_of(self.residual + step.taken) <= LITTLE * size
+        held = step.reaction is None or self.objective.satisfies_equations(self.ended.x)
+        moving = held or size_of(self.residual + step.taken) <= LITTLE * size
         if moving or size <= LITTLE * self.first_residual:
             self.idle, self.first_residual = 0, size
         else:

@@ -34,6 +34,8 @@ DIRECTION_TOLERANCE = float(np.deg2rad(0.01))
 """By how much a direction may miss its value between nodes, in [rad]."""
 LEAST_ROOM = 10.0
 """Room in tolerances below which a value is kept instead: a range that is not much wider."""
+NARROW_ROOM = 100.0
+"""Room in tolerances below which a solve begins with the value in its middle."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,8 +204,11 @@ def distance_kept(
     def squared(q: ca.SX) -> ca.SX:
         return ca.sumsqr(offsets(q))
 
-    on = Between(upper=room**2)
-    return Condition(squared, on, name=title, unit="m", scale=room**2, read=root)
+    on, middle = Between(upper=room**2), None
+    if room < NARROW_ROOM * accepted:
+        middle = _value(title, offsets, 0.0, accepted, "m")
+    more: dict[str, Any] = {"scale": room**2, "read": root, "middle": middle}
+    return Condition(squared, on, name=title, unit="m", **more)
 
 
 def direction_kept(
@@ -221,7 +226,11 @@ def direction_kept(
     if room < LEAST_ROOM * accepted:
         return _value(title, offsets, room, accepted, "rad")
     most = 4.0 * np.sin(min(room, np.pi) / 2) ** 2
-    return Condition(chord, Between(upper=most), name=title, unit="deg", scale=most, read=_angle)
+    middle = None
+    if room < NARROW_ROOM * accepted:
+        middle = _value(title, offsets, 0.0, accepted, "rad")
+    more: dict[str, Any] = {"scale": most, "read": _angle, "middle": middle}
+    return Condition(chord, Between(upper=most), name=title, unit="deg", **more)
 
 
 def root(square: float) -> float:

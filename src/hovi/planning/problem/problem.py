@@ -316,6 +316,11 @@ class TrajectoryProblem(ProblemSummary):
         return other
 
     @cached_property
+    def centered(self) -> TrajectoryProblem:
+        """The same problem with the middles of narrow bounds in their place."""
+        return dataclasses.replace(self, conditions=[each.centered for each in self.conditions])
+
+    @cached_property
     def finer(self) -> TrajectoryProblem:
         """The same problem with more inner modes, for error estimates."""
         finer = self._with(self.ld.finer)

@@ -15,6 +15,9 @@ def all_methods() -> Iterator[ProblemMethod]:
     Each is imported when it is its turn: most problems need the first one only.
     """
     yield TrustRegion()
+    from hovi.planning.solver.methods.middle_first import MiddleFirst
+
+    yield MiddleFirst()
     from hovi.planning.solver.methods.free_first import FreeFirst
 
     yield FreeFirst()
