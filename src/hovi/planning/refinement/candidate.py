@@ -253,8 +253,8 @@ def _trusted(uncancelled: float, tolerance: Tolerance) -> bool:
 def error_of_cost(solution: Solution, finer: FinerSolution) -> float:
     """Relative error of the cost, including the effects of the limits' tolerance and the barrier.
 
-    Within limits it is at least the sum of the contributions: of opposite signs, errors of intervals
-    may cancel. Not below ROUNDING_FLOOR; 0 for zero cost with zero error.
+    Within limits at least the sum of the contributions: errors of opposite signs cancel in the
+    difference of costs. Not below ROUNDING_FLOOR; 0 for zero cost with zero error.
     """
     error = relative_difference(finer.known, finer.cost, finer.problem.negligible_cost)
     if finer.known == 0:
