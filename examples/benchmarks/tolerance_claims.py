@@ -84,7 +84,7 @@ def measure(arm: str, limits: str, count: int, seed: int) -> list[Claim]:
 def _true_error(plan: hovi.Solution) -> float:
     """The relative distance of the cost from that of a finer solution near the plan."""
     problem, grid = plan.problem, plan.problem.grid.halved()
-    if problem.limits is None:
+    if not problem.limited:
         reference = problem.on(grid.enriched(4))
     else:
         limits = replace(problem.limits, tolerance=TIGHTER * problem.limits.tolerance)

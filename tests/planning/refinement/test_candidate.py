@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache, partial
 from typing import Any
 
@@ -19,6 +20,8 @@ from hovi.planning.problem.limits import as_limits
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.problem.tolerance import Accuracy, Tolerance
 from hovi.planning.refinement.adaptive import solve_to_tolerance
+from hovi.planning.refinement.candidate import contributions, error_of_cost
+from hovi.planning.refinement.error_estimate import finer_than
 from hovi.scene.scene import Scene
 from hovi.schemes import by_name
 from oracles.on_grid import solve_on_grid
@@ -139,6 +142,18 @@ def test_a_cost_without_error_by_cancellation_is_not_within_a_tolerance(arm_scen
             assert abs(first_error(arm_scene, root, intervals)) < 0.1 * size
             found += 1
     assert found >= 3
+
+
+def test_within_limits_errors_of_intervals_that_cancel_count_by_their_magnitudes(
+    arm_scene: Scene,
+) -> None:
+    found = solve_on_grid(reach(arm_scene, "galerkin-2x8", 16, limits=FAST))
+    finer = finer_than(found)
+    assert finer is not None
+    cancelled = replace(finer, cost=finer.known)
+    magnitudes = contributions(cancelled).sum()
+    assert magnitudes > 1e-5
+    assert error_of_cost(found, cancelled) >= magnitudes
 
 
 @pytest.mark.parametrize("intervals", [8, 12, 16])

@@ -17,6 +17,7 @@ from oracles.on_grid import solve_on_grid
 Array = npt.NDArray[np.float64]
 
 UR5_REACH = [1.46, -2.7, 1.45, 1.55, 2.1, -1.61], [2.5, 2.36, 0.25, -0.95, 2.2, 1.59], 3.89
+SO100_REACH = [0.886, 1.65, -2.167, -0.702, 2.447], [1.311, 1.387, -1.757, -1.005, 1.52], 3.722
 XARM_REACH = [0.3, -0.6, 0.5, 0.8, 0.2, 0.4, -0.3], [-0.9, 0.4, -0.8, 1.6, 1.2, 1.3, 1.5], 3.0
 
 
@@ -175,3 +176,30 @@ def test_a_motion_that_finer_grids_move_ever_further_is_no_minimum(
     assert finer.success
     assert finer.cost < 0.99 * found.cost
     assert hovi.plan(scene, start, goal, 4.190286081291065, **options, self_collision=False).success
+
+
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-4])
+def test_a_tolerance_is_claimed_in_a_flat_valley_only_as_halves_of_the_intervals_confirm_it(
+    tolerance: float,
+) -> None:
+    """Two more modes move its light joints far at the same cost, and halves lower the cost."""
+    scene = hovi.Scene(
+        hovi.load_robot("so100", locked=["root_joint", "gripper"]), [hovi.effects.Gravity()]
+    )
+    start, goal, duration = SO100_REACH
+    found = hovi.plan(
+        *(scene, start, goal, duration),
+        limits="none",
+        tolerance=tolerance,
+        self_collision=False,
+        processes=1,
+    )
+    assert found.success, found.message
+    assert found.accuracy is not None
+    assert found.error_estimate is not None
+    assert found.problem is not None
+    halves = found.problem.grid.halved().enriched(4)
+    lower = solve_on_grid(found.problem.on(halves), found.trajectory, max_iterations=2000).cost
+    error = found.cost / lower - 1
+    assert not found.accuracy.reached or error <= tolerance
+    assert error <= found.error_estimate

@@ -23,6 +23,7 @@ from hovi.planning.refinement.error_estimate import (
 )
 from hovi.planning.refinement.hp_refinement import galerkin_with_more_points
 from hovi.planning.refinement.next_grid import interpolated_to, next_grid
+from hovi.planning.refinement.spinning import solved_on_halves
 from hovi.planning.solver.central_path import CentralPath
 from hovi.planning.solver.solver import Solution, solved_on_grid
 from hovi.planning.solver.status import Status
@@ -162,10 +163,11 @@ class Refinement:
         began = time.perf_counter()
         left = self.deadline.seconds_left
         candidate = Candidate.of(solution, self.tolerance, left, previous_decrease)
+        candidate, more = _confirmed(candidate)
         grid = solution.trajectory.grid
         points = sum(len(scheme.points) * len(index) for scheme, index in grid.groups)
         seconds = solution.solve_seconds + time.perf_counter() - began
-        error, steps = candidate.error, solution.nit
+        error, steps = candidate.error, solution.nit + more
         done = Round(grid.intervals, points, solution.cost, error, steps, seconds, asked_by)
         self.rounds.append(done)
         if self.on_round is not None:
@@ -286,6 +288,19 @@ class Refinement:
     @property
     def _frame(self) -> str | None:
         return self.tolerance.frame
+
+
+def _confirmed(candidate: Candidate) -> tuple[Candidate, int]:
+    """A candidate within the tolerance, compared with halves of the intervals in a flat valley.
+
+    And the number of steps that this took.
+    """
+    if candidate.finer is None or not candidate.within_tolerance:
+        return candidate, 0
+    halves = solved_on_halves(candidate.solution, candidate.finer)
+    if halves is None:
+        return candidate, 0
+    return candidate.compared_with(Candidate(halves, candidate.tolerance)), halves.nit
 
 
 def _along(

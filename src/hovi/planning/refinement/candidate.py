@@ -253,7 +253,8 @@ def _trusted(uncancelled: float, tolerance: Tolerance) -> bool:
 def error_of_cost(solution: Solution, finer: FinerSolution) -> float:
     """Relative error of the cost, including the effects of the limits' tolerance and the barrier.
 
-    Not below ROUNDING_FLOOR; 0 for zero cost with zero error.
+    Within limits at least the sum of the contributions: errors of opposite signs cancel in the
+    difference of costs. Not below ROUNDING_FLOOR; 0 for zero cost with zero error.
     """
     error = relative_difference(finer.known, finer.cost, finer.problem.negligible_cost)
     if finer.known == 0:
@@ -261,7 +262,8 @@ def error_of_cost(solution: Solution, finer: FinerSolution) -> float:
     problem = solution.problem
     assert problem is not None
     if problem.limited:
-        error = finer.safety_factor * error + _excess_of_bounds(solution)
+        error = max(finer.safety_factor * error, float(contributions(finer).sum()))
+        error += _excess_of_bounds(solution)
     elif error > CURVE_TOLERANCE:
         error *= LOOSE_SAFETY_FACTOR
     return max(error + cost_of_tolerance(solution), ROUNDING_FLOOR)

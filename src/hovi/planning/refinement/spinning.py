@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.discrete.measures.motion_error import relative_difference
+from hovi.discrete.trajectory import Trajectory
 from hovi.errors import HoviError
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.refinement.error_estimate import MAX_FINER_STEPS, FinerSolution, finer_than
@@ -35,6 +36,9 @@ CLOSE = 1e-3
 FAR = 1.0
 """Distance from a motion to the finer solution in a coordinate, in [rad] or [m], above which the
 two may be different motions along a valley, whose costs say little about the error."""
+MOVED = 0.1
+"""Such a distance, in [rad] or [m], above which an error of the cost is not claimed to be within a
+tolerance by one comparison alone: along a flat valley both grids may be too coarse."""
 CONTRACTION = 0.5
 """Distance from the finer solution to a still finer one, relative to that from the motion to the
 finer one, up to which the grids converge."""
@@ -136,14 +140,29 @@ def fault_of_valley(
     return f"{where}a finer grid confirms it, but a still finer one does not"
 
 
+def solved_on_halves(solution: Solution, finer: FinerSolution) -> Solution | None:
+    """A solve on halves of the finer solution's intervals, from there, to confirm its cost.
+
+    None within limits, and where the finer solution has not MOVED.
+    """
+    assert solution.problem is not None
+    if solution.problem.limited or _apart(solution, finer.path.q) <= MOVED:
+        return None
+    return _on_halves(finer.problem, finer.trajectory)
+
+
+def _on_halves(problem: TrajectoryProblem, guess: Trajectory) -> Solution:
+    halves = problem.on(problem.grid.halved())
+    return solved_on_grid(halves, guess, max_iterations=MAX_FINER_STEPS)
+
+
 def _is_confirmed(known: Solution, spins: bool, far: float) -> bool:
     """Whether halves of the intervals confirm a finer solution.
 
     far: its distance from the motion, see `_apart`.
     """
     assert known.problem is not None
-    halves = known.problem.on(known.problem.grid.halved())
-    found = solved_on_grid(halves, known.trajectory, max_iterations=MAX_FINER_STEPS)
+    found = _on_halves(known.problem, known.trajectory)
     if not found.success:
         return False
     if spins:
