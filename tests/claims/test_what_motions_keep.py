@@ -507,6 +507,17 @@ def test_a_path_is_followed_through_its_poses() -> None:
     assert speeds[[0, -1]].max() < 1e-2 * speeds.max()  # at rest at both ends
 
 
+def test_a_path_shorter_than_the_motion_is_held_at_its_last_pose() -> None:
+    begun = planar().frame_pose("tip", BENT)
+    places = begun[:3, 3] + np.array([[0.0, 0.0, 0.0], [-0.1, 0.0, 0.05], [-0.1, 0.0, 0.15]])
+    goal = hovi.FrameGoal("tip", position=places[-1])
+    found = on_planar(Follow("tip", [0.0, 0.3, 0.6], places), goal=goal)
+    moved, t = planar_poses(found)[:, :3, 3], times(found.trajectory)
+    assert np.isclose(t[-1], 1.0)
+    assert np.abs(moved[t >= 0.6] - places[-1]).max() <= 1e-5
+    assert np.linalg.norm(moved[600] - places[1]) <= 1e-5
+
+
 def test_two_hands_keep_their_relative_pose() -> None:
     held = [f"{side}_gripper_{finger}_finger_joint" for side in "lr" for finger in "lr"]
     robot = hovi.load_robot("baxter", locked=["head_pan", *held])

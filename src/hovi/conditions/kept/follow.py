@@ -45,7 +45,10 @@ class Follow(KeepFrame):
     The path is a spline of degree 5 through the poses, of class C^4, at rest and without
     acceleration at both ends; quaternions are interpolated so, and divided by their length.
 
-    times: ascending, the first one 0 and the last one the duration, shape (M,), in [s].
+    A motion that lasts longer than the path holds its last pose from then on.
+
+    times: ascending, the first one 0, shape (M,), in [s]; the last one is when the path ends, for
+        most motions their duration.
     positions: shape (M, 3), in [m]. rpy: roll, pitch and yaw as in a URDF, shape (M, 3), in [rad];
         none by default, which leaves the rotation free.
     tolerance: by how much positions may be missed between nodes, in [m] or as "0.01 mm"; angle:
