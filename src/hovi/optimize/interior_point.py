@@ -289,6 +289,8 @@ class _Iteration(BoundedSteps[X]):
         poor = self._ratio(step, before, there) < CURVED and math.isfinite(there.merit)
         if step.reaction is None or not poor or step.fraction == 0.0:
             return None
+        if self.objective.satisfies_equations(there.x):  # what they miss is rounding
+            return None
         expected = self.residual + step.fraction * step.taken
         missed = self.objective.residual(there.x) - expected
         more = model.correction(step.trial.factor, missed)
