@@ -21,6 +21,7 @@ STARTS = {
 TENTH_MILLIMETRE, TENTH_DEGREE = 1e-4, float(np.deg2rad(0.1))
 """Ten times the tolerances."""
 WAY = np.array([-0.05, 0.25, 0.0])
+MORE_ROOMS = [pytest.param(room, marks=pytest.mark.long) for room in (1.3, 5.0, 9.0)]
 ALONE: dict[str, Any] = {"self_collision": False, "processes": 1}
 
 
@@ -93,7 +94,7 @@ def require_held(
 
 
 @pytest.mark.parametrize("limits", ["none", "urdf"])
-@pytest.mark.parametrize("room", [1.1, 1.3, 2.0, 9.0])
+@pytest.mark.parametrize("room", [1.1, 2.0, *MORE_ROOMS])
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("arm", STARTS)
 def test_a_narrow_room_is_used_and_held(arm: str, kind: str, room: float, limits: str) -> None:

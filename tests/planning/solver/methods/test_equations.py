@@ -23,8 +23,8 @@ IPOPT = {
     "pendubot_swing_up": (15, 21.911),
     "cart_pole_swing_up": (25, 24.396),
 }
-"""Steps of Ipopt on the same discrete problems, with `galerkin-2` on 40 intervals, and the cost of a
-minimum near the cubic guess, which others may undercut."""
+"""Steps of Ipopt on the same discrete problems, with `galerkin-2` on 40 intervals, and the cost of
+a minimum near the cubic guess, which others may undercut."""
 BUCKLING = (4 * np.pi**2, 80.763, 16 * np.pi**2)
 """Loads at which a straight rod of unit length and stiffness, clamped at both ends, loses
 stability; the second and a repeated third one with its midpoint held as well."""
