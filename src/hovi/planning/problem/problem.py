@@ -43,6 +43,7 @@ from hovi.planning.clearance.within_reach import distances_within_reach, with_ga
 from hovi.planning.problem.along_nodes import NodeState, equations_at_nodes, sizes_of
 from hovi.planning.problem.clock import SAME_LENGTH, Clock, Lengths
 from hovi.planning.problem.conserved_momentum import Stop, kept_in_free_fall
+from hovi.planning.problem.detours import through_frames
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.goals import Via, goal_state
 from hovi.planning.problem.hessian_structure import ActionStructure
@@ -367,11 +368,17 @@ class TrajectoryProblem(ProblemSummary):
         return with_fixed(self.coordinates, ends, self.ends, self.free_ends, self.periodic)
 
     def guess(self, name: str) -> DiscretePath:
-        """The guess with a name; for orders other than 2 always the Hermite polynomial."""
+        """The guess with a name, past the frames of via points.
+
+        For orders other than 2 it is always the Hermite polynomial.
+        """
         known = self.coordinates, self.ends, self.grid.duration
         if self.holds:
-            return self.path(curve_through(name, *known, self.holds, self.turns))
-        return self.path(named_curve(name, *known, self.turns))
+            curve = curve_through(name, *known, self.holds, self.turns)
+        else:
+            curve = named_curve(name, *known, self.turns)
+        on, T = self.coordinates, self.grid.duration
+        return self.path(through_frames(curve, self.via, on, self.limits, T))
 
     def trajectory(self, path: DiscretePath) -> Trajectory:
         """A path on the grid as a trajectory without momenta, for sampling."""

@@ -1,0 +1,52 @@
+"""Guesses that pass through the places that frames are to reach on the way."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi.discrete.guess import Curve
+from hovi.planning.problem.frame_goal import FrameGoal
+from hovi.planning.problem.goals import Via, goal_state
+from hovi.planning.problem.limits import Limits
+from hovi.planning.problem.seams import Seam
+from hovi.robot.space.coordinates import Coordinates
+
+Array = npt.NDArray[np.float64]
+
+
+def through_frames(
+    curve: Curve, via: Sequence[Via], on: Coordinates, limits: Limits | None, duration: float
+) -> Curve:
+    """A curve plus a spline to near configurations in which frames are where they are to be.
+
+    A straight way may pass by with a hand turned half around, from where no step turns it back. The
+    cubic spline is at rest at both ends, and zero at seams and where no configuration is found.
+
+    curve: q, v, a, up to the jerk on vector spaces. duration: T, in [s].
+    """
+    none = np.zeros(on.nv)
+    moved = {0.0: none, duration: none}
+    for each in via:
+        moved[each.time] = none
+        if isinstance(each.goal, FrameGoal) and not isinstance(each, Seam):
+            near = curve(np.array([each.time]))[0][0]
+            bounds = None if limits is None else limits.until(each.time)
+            reached = goal_state(each.goal, "via point", on, near, bounds)
+            if not reached.reason:
+                moved[each.time] = on.difference(near, reached.state.on(on, "via")[0])
+    times = sorted(moved)
+    if not any(moved[t].any() for t in times):
+        return curve
+    from scipy.interpolate import CubicSpline  # slow to import, and most motions pass no frames
+
+    spline = CubicSpline(times, [moved[t] for t in times], bc_type="clamped")
+
+    def detour(t: Array) -> tuple[Array, ...]:
+        q, v, a, *jerk = curve(t)
+        composed = on.chart.composed((q, v, a), *(spline(t, order) for order in range(3)))
+        return (*composed, *(each + spline(t, 3) for each in jerk))
+
+    return detour
