@@ -37,8 +37,8 @@ FAR = 1.0
 """Distance from a motion to the finer solution in a coordinate, in [rad] or [m], above which the
 two may be different motions along a valley, whose costs say little about the error."""
 MOVED = 0.1
-"""Such a distance, in [rad] or [m], above which an error of the cost is not claimed to be within a
-tolerance by one comparison alone: along a flat valley both grids may be too coarse."""
+"""Distance from a motion to the finer solution in a coordinate, in [rad] or [m], above which halves
+of the intervals have to confirm a tolerance: along a flat valley both grids may be too coarse."""
 CONTRACTION = 0.5
 """Distance from the finer solution to a still finer one, relative to that from the motion to the
 finer one, up to which the grids converge."""
