@@ -42,7 +42,7 @@ def workers(parent: subprocess.Popen[str]) -> list[int]:
 
 @needs_workers
 def test_a_plan_whose_workers_are_killed_ends_with_the_best_of_the_others() -> None:
-    process = start(300, "--json", "--no-certificate")
+    process = start(1000, "--json", "--no-certificate")
     killed: list[int] = []
     while len(killed) < 2 and process.poll() is None:
         for pid in [each for each in workers(process) if each not in killed][:1]:
@@ -56,7 +56,7 @@ def test_a_plan_whose_workers_are_killed_ends_with_the_best_of_the_others() -> N
     result = json.loads(out)
     assert result["status"] == "minimum"
     assert len(result["minima"]) > 1
-    assert " of 300 starts: a worker process was ended by SIGKILL, as " in result["message"]
+    assert " of 1000 starts: a worker process was ended by SIGKILL, as " in result["message"]
     assert "Lost 1 of" in result["message"] or "Lost 2 of" in result["message"]
 
 
