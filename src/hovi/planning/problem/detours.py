@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
+from hovi.discrete.grid import Grid
 from hovi.discrete.guess import Curve
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.goals import Via, goal_state
@@ -18,25 +19,26 @@ Array = npt.NDArray[np.float64]
 
 
 def through_frames(
-    curve: Curve, via: Sequence[Via], on: Coordinates, limits: Limits | None, duration: float
+    curve: Curve, via: Sequence[Via], on: Coordinates, limits: Limits | None, grid: Grid
 ) -> Curve:
     """A curve plus a spline to near configurations in which frames are where they are to be.
 
     A straight way may pass by with a hand turned half around, from where no step turns it back. The
     cubic spline is at rest at both ends, and zero at seams and where no configuration is found.
 
-    curve: q, v, a, up to the jerk on vector spaces. duration: T, in [s].
+    curve: q, v, a, up to the jerk on vector spaces. grid: whose nodes are at the via points.
     """
     none = np.zeros(on.nv)
-    moved = {0.0: none, duration: none}
+    moved = {0.0: none, grid.duration: none}
     for each in via:
-        moved[each.time] = none
+        time = float(grid.t[grid.node_at(each.time)])
+        moved[time] = none
         if isinstance(each.goal, FrameGoal) and not isinstance(each, Seam):
-            near = curve(np.array([each.time]))[0][0]
+            near = curve(np.array([time]))[0][0]
             bounds = None if limits is None else limits.until(each.time)
             reached = goal_state(each.goal, "via point", on, near, bounds)
             if not reached.reason:
-                moved[each.time] = on.difference(near, reached.state.on(on, "via")[0])
+                moved[time] = on.difference(near, reached.state.on(on, "via")[0])
     times = sorted(moved)
     if not any(moved[t].any() for t in times):
         return curve

@@ -377,8 +377,8 @@ class TrajectoryProblem(ProblemSummary):
             curve = curve_through(name, *known, self.holds, self.turns)
         else:
             curve = named_curve(name, *known, self.turns)
-        on, T = self.coordinates, self.grid.duration
-        return self.path(through_frames(curve, self.via, on, self.limits, T))
+        on, grid = self.coordinates, self.grid
+        return self.path(through_frames(curve, self.via, on, self.limits, grid))
 
     def trajectory(self, path: DiscretePath) -> Trajectory:
         """A path on the grid as a trajectory without momenta, for sampling."""
