@@ -133,6 +133,15 @@ def in_chart(
     return coordinates.chart.jet(np.broadcast_to(q0, (len(x), coordinates.nq)), x, dx, ddx)
 
 
+def moved_by(
+    coordinates: Coordinates, jet: tuple[Array, ...], x: Array, dx: Array, ddx: Array, dddx: Array
+) -> tuple[Array, ...]:
+    """(q, v, a) (+) x(t) of a curve, and the jerk where it has one, on vector spaces."""
+    q, v, a, *jerk = jet
+    moved = coordinates.chart.composed((q, v, a), x, dx, ddx)
+    return (*moved, *(each + dddx for each in jerk))
+
+
 def with_bump(
     base: Curve, coordinates: Coordinates, duration: float, seed: int, fraction: float = 1.0
 ) -> Curve:
@@ -151,15 +160,13 @@ def with_bump(
     w = np.pi / duration
 
     def curve(t: Array) -> tuple[Array, ...]:
-        q, v, a, *jerk = base(t)
         # sin(s) sin(j s) = (cos((j-1) s) - cos((j+1) s)) / 2
         low, high = np.outer(t, j - 1) * w, np.outer(t, j + 1) * w
         x = (np.cos(low) - np.cos(high)) / 2
         dx = (-(j - 1) * np.sin(low) + (j + 1) * np.sin(high)) * w / 2
         ddx = (-((j - 1) ** 2) * np.cos(low) + (j + 1) ** 2 * np.cos(high)) * w**2 / 2
-        moved = coordinates.chart.composed((q, v, a), x @ c, dx @ c, ddx @ c)
         dddx = ((j - 1) ** 3 * np.sin(low) - (j + 1) ** 3 * np.sin(high)) * w**3 / 2
-        return (*moved, *(each + dddx @ c for each in jerk))
+        return moved_by(coordinates, base(t), x @ c, dx @ c, ddx @ c, dddx @ c)
 
     return curve
 
@@ -176,11 +183,10 @@ def with_turns(base: Curve, coordinates: Coordinates, duration: float, turns: Ar
     def curve(t: Array) -> tuple[Array, ...]:
         s = np.asarray(t)[:, None] / duration
         x, dx, ddx = s**2 * (3 - 2 * s), 6 * s * (1 - s) / duration, (6 - 12 * s) / duration**2
-        q, v, a, *jerk = base(t)
-        moved = coordinates.chart.composed(
-            (q, v, a), _modulo_period(coordinates, x * angle), dx * angle, ddx * angle
+        turned = _modulo_period(coordinates, x * angle)
+        return moved_by(
+            coordinates, base(t), turned, dx * angle, ddx * angle, -12 * angle / duration**3
         )
-        return (*moved, *(each - 12 * angle / duration**3 for each in jerk))
 
     return curve
 

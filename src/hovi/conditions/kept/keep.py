@@ -204,9 +204,7 @@ def distance_kept(
     def squared(q: ca.SX) -> ca.SX:
         return ca.sumsqr(offsets(q))
 
-    on, middle = Between(upper=room**2), None
-    if room < NARROW_ROOM * accepted:
-        middle = _value(title, offsets, 0.0, accepted, "m")
+    on, middle = Between(upper=room**2), _middle(title, offsets, room, accepted, "m")
     more: dict[str, Any] = {"scale": room**2, "read": root, "middle": middle}
     return Condition(squared, on, name=title, unit="m", **more)
 
@@ -226,9 +224,7 @@ def direction_kept(
     if room < LEAST_ROOM * accepted:
         return _value(title, offsets, room, accepted, "rad")
     most = 4.0 * np.sin(min(room, np.pi) / 2) ** 2
-    middle = None
-    if room < NARROW_ROOM * accepted:
-        middle = _value(title, offsets, 0.0, accepted, "rad")
+    middle = _middle(title, offsets, room, accepted, "rad")
     more: dict[str, Any] = {"scale": most, "read": _angle, "middle": middle}
     return Condition(chord, Between(upper=most), name=title, unit="deg", **more)
 
@@ -249,6 +245,14 @@ def _value(
     """Offsets that vanish, but for what is accepted, or the room if that is less."""
     tolerance = min(room, accepted) if room > 0 else accepted
     return Condition(offsets, Equal(0.0), name=title, unit=unit, tolerance=tolerance)
+
+
+def _middle(
+    title: str, offsets: Callable[..., ca.SX], room: float, accepted: float, unit: str
+) -> Condition[Any, Any] | None:
+    """The value in the middle of a narrow room; None for another one."""
+    narrow = room < NARROW_ROOM * accepted
+    return _value(title, offsets, 0.0, accepted, unit) if narrow else None
 
 
 def pose_kept(

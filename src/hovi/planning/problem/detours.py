@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.discrete.grid import Grid
-from hovi.discrete.guess import Curve
+from hovi.discrete.guess import Curve, moved_by
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.goals import Via, goal_state
 from hovi.planning.problem.limits import Limits
@@ -46,9 +46,4 @@ def through_frames(
 
     spline = CubicSpline(times, [moved[t] for t in times], bc_type="clamped")
 
-    def detour(t: Array) -> tuple[Array, ...]:
-        q, v, a, *jerk = curve(t)
-        composed = on.chart.composed((q, v, a), *(spline(t, order) for order in range(3)))
-        return (*composed, *(each + spline(t, 3) for each in jerk))
-
-    return detour
+    return lambda t: moved_by(on, curve(t), *(spline(t, order) for order in range(4)))

@@ -18,7 +18,7 @@ from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.limits import Limits
 from hovi.planning.search.job import Job
 from hovi.planning.solver.solver import Solution, solved_on_grid
-from hovi.planning.solver.status import Status
+from hovi.planning.solver.status import STOPPED, Status
 from hovi.system.deadline import Deadline
 from hovi.system.interruption import record_interrupt
 from hovi.system.progress import Progress
@@ -30,8 +30,6 @@ MAX_SOLVES = 12
 LONGER = 2.0, 1.5, 1.25, 1.1
 """Durations before the given one, relative to it."""
 Goal = TypeVar("Goal", State, State | FrameGoal)
-STOPPED = Status.TIME_LIMIT, Status.INTERRUPTED
-"""Statuses that end a search."""
 UNUSABLE = Status.DIVERGED, Status.INFEASIBLE
 """Statuses without a useful motion."""
 

@@ -22,10 +22,10 @@ from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError
 from hovi.planning.problem.clock import Clock
 from hovi.planning.problem.time_price import TimePrice
-from hovi.planning.search.continuation import STOPPED, how_ended
+from hovi.planning.search.continuation import how_ended
 from hovi.planning.solver.outcome.cost_with_time import price_of_time
 from hovi.planning.solver.solver import Solution
-from hovi.planning.solver.status import Status
+from hovi.planning.solver.status import STOPPED, Status
 from hovi.system.dataclass import dataclass
 from hovi.system.deadline import OutOfTimeError
 from hovi.system.interruption import record_interrupt

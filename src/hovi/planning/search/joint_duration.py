@@ -15,7 +15,6 @@ from hovi.discrete.grid import DiscretePath, Grid
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.problem.time_price import TimePrice
 from hovi.planning.problem.tolerance import LAST_BARRIER
-from hovi.planning.search.continuation import STOPPED
 from hovi.planning.search.free_duration import (
     DURATION_PRECISION,
     MAX_STRIDE,
@@ -28,7 +27,7 @@ from hovi.planning.search.free_duration import (
 )
 from hovi.planning.solver.free_duration.joint_solve import solve_jointly, solves_jointly
 from hovi.planning.solver.solver import Solution
-from hovi.planning.solver.status import Status
+from hovi.planning.solver.status import STOPPED, Status
 
 Array = npt.NDArray[np.float64]
 OnGrid = Callable[[Grid], SolveFor]

@@ -22,7 +22,7 @@ from hovi.planning.refinement.faults.narrow_features import NARROW
 from hovi.planning.refinement.hp_refinement import galerkin_with_more_points
 from hovi.planning.refinement.resolution import Resolution, resolved
 from hovi.planning.search.branch_choice import Ends
-from hovi.planning.search.continuation import STOPPED, UNUSABLE, may_help, solve_by_continuation
+from hovi.planning.search.continuation import UNUSABLE, may_help, solve_by_continuation
 from hovi.planning.search.final_stages import (
     MAX_REFINED,
     REFINING,
@@ -36,7 +36,7 @@ from hovi.planning.search.job import Job, split_for_charts
 from hovi.planning.search.multistart import Exploration, Pool, default_processes, explore
 from hovi.planning.solver.initial_path import guess_path
 from hovi.planning.solver.solver import Solution
-from hovi.planning.solver.status import Status
+from hovi.planning.solver.status import STOPPED, Status
 from hovi.system.dataclass import dataclass
 from hovi.system.deadline import Deadline, OutOfTimeError
 from hovi.system.interruption import interrupted, raise_if_interrupted, record_interrupt

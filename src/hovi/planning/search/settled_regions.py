@@ -17,7 +17,6 @@ from hovi.planning.problem.inverse_kinematics import (
     position_bounds,
 )
 from hovi.planning.problem.kinematics.branches import find_branches
-from hovi.planning.search.continuation import STOPPED
 from hovi.planning.search.options import PlanOptions
 from hovi.planning.solver.regions import (
     ends_inside,
@@ -28,6 +27,7 @@ from hovi.planning.solver.regions import (
     with_next_sides,
 )
 from hovi.planning.solver.solver import Solution
+from hovi.planning.solver.status import STOPPED
 from hovi.scene.scene import Scene
 from hovi.system.deadline import Deadline
 

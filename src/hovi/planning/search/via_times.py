@@ -34,11 +34,11 @@ from hovi.planning.problem.inverse_kinematics import (
     position_bounds,
 )
 from hovi.planning.refinement.error_estimate import with_metadata
-from hovi.planning.search.continuation import STOPPED
 from hovi.planning.search.free_duration import cost_in_parts
 from hovi.planning.search.options import PlanOptions
 from hovi.planning.solver.free_duration.timed_path import stretched_path
 from hovi.planning.solver.solver import Solution, solved_on_grid
+from hovi.planning.solver.status import STOPPED
 from hovi.robot.robot import Robot
 from hovi.system.dataclass import dataclass
 from hovi.system.deadline import Deadline, OutOfTimeError

@@ -15,7 +15,6 @@ from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.notation.ends import End as Start
 from hovi.planning.problem.notation.ends import as_start
 from hovi.planning.refinement.faults.cautions import keeping_warnings
-from hovi.planning.search.continuation import STOPPED
 from hovi.planning.search.free_segments import FreeSegments
 from hovi.planning.search.group import in_group, with_others
 from hovi.planning.search.job import Acting, Job
@@ -43,6 +42,7 @@ from hovi.planning.sequence.sequence_job import job_of
 from hovi.planning.solver.iterates import Cancel, OnIterate, watched
 from hovi.planning.solver.outcome.without_solve import unresolved_at_once
 from hovi.planning.solver.solver import Solution
+from hovi.planning.solver.status import STOPPED
 from hovi.scene.scene import Scene
 from hovi.system.blas_threads import one_blas_thread
 from hovi.system.deadline import Deadline

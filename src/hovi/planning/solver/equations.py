@@ -40,6 +40,7 @@ class Equations:
         self.along = [AlongMoments(problem, each, size) for each, size in parts]
         self.at_nodes = NodeEquations.of(problem.equations, problem.grid)
         self._known: tuple[KktLayout, Array] | None = None
+        self._last: tuple[DiscretePath, list[Array]] | None = None
 
     @property
     def sizes(self) -> list[int]:
@@ -55,9 +56,14 @@ class Equations:
         return np.concatenate(parts)
 
     def conditions(self, x: DiscretePath, jets: Sequence[Jet]) -> list[Array]:
-        """c of the conditions: of each along the motion in its intervals, then at nodes."""
-        along = [each.residual(jets) for each in self.along]
-        return [*along, *(each.residual(x) for each in self.at_nodes)]
+        """c of the conditions: of each along the motion in its intervals, then at nodes.
+
+        The last ones are cached: a step asks for them up to five times.
+        """
+        if self._last is None or self._last[0] is not x:
+            along = [each.residual(jets) for each in self.along]
+            self._last = x, [*along, *(each.residual(x) for each in self.at_nodes)]
+        return self._last[1]
 
     def rows(
         self, x: DiscretePath, expansion: Expansion, jets: Sequence[Jet]

@@ -35,6 +35,10 @@ class Status(StrEnum):
     DIVERGED = "diverged"
 
 
+STOPPED = Status.TIME_LIMIT, Status.INTERRUPTED
+"""Statuses after which nothing else is tried."""
+
+
 def chart_sentence(problem: TrajectoryProblem, path: DiscretePath) -> str:
     """A warning if an orientation turns by more than pi within an interval; "" if none does."""
     if problem.ld.chart is None:

@@ -11,11 +11,8 @@ from hovi.planning.solver.answer import Answer
 from hovi.planning.solver.methods.free_first import FreeFirst
 from hovi.planning.solver.methods.interior_point import InteriorPoint
 from hovi.planning.solver.methods.method import Guess, ProblemMethod, Report
-from hovi.planning.solver.status import Status
+from hovi.planning.solver.status import STOPPED, Status
 from hovi.system.deadline import Deadline
-
-STOPPED = Status.TIME_LIMIT, Status.INTERRUPTED
-"""Statuses after which there is no other solve."""
 
 
 class MiddleFirst(ProblemMethod):
